@@ -1,0 +1,141 @@
+"""The pinhole camera with lens distortion, and rigid poses.
+
+Pixel centres lie at integers; distortion is in OpenCV's order; `camera_from_probe` maps probe millimetres to camera
+millimetres (x right, y down, z forward).
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from arlight.errors import CameraError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Intrinsics of the camera that filmed the sheet."""
+
+    image_size: tuple[int, int]
+    """(width, height) [px]."""
+    camera_matrix: Array
+    """(3, 3) intrinsic matrix [px]."""
+    distortion: Array
+    """(n,) lens distortion in OpenCV's order; zeros for none."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "camera_matrix", np.asarray(self.camera_matrix, float))
+        object.__setattr__(self, "distortion", np.asarray(self.distortion, float).reshape(-1))
+        _check_intrinsics(self.image_size, self.camera_matrix, self.distortion)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "Camera":
+        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion.
+
+        Raises:
+            CameraError: the file is missing, is not JSON, or holds impossible values.
+        """
+        path = Path(path)
+        try:
+            content: dict[str, Any] = json.loads(path.read_text())
+            width, height = content["image_size"]
+            return cls((int(width), int(height)), content["camera_matrix"], content.get("distortion", [0.0] * 5))
+        except OSError as error:
+            raise CameraError(f"{path}: cannot be read ({error.strerror}); a camera.json is expected there") from error
+        except CameraError as error:
+            raise CameraError(f"{path}: {error}") from error
+        except (KeyError, TypeError, ValueError) as error:
+            raise CameraError(
+                f"{path}: expected JSON with image_size [w, h], camera_matrix 3x3 and distortion; found {error!r}"
+            ) from error
+
+    def save(self, path: Path | str) -> None:
+        """Write camera.json."""
+        content = {
+            "image_size": list(self.image_size),
+            "camera_matrix": self.camera_matrix.tolist(),
+            "distortion": self.distortion.tolist(),
+        }
+        Path(path).write_text(json.dumps(content, indent=1) + "\n")
+
+    def project(self, camera_from_probe: "Pose", points_mm: ArrayLike) -> Array:
+        """Pixels (n, 2) of probe-frame points (n, 3) [mm], lens distortion included."""
+        points = np.ascontiguousarray(points_mm, float).reshape(-1, 1, 3)
+        pixels, _ = cv2.projectPoints(
+            points, camera_from_probe.rvec, camera_from_probe.translation, self.camera_matrix, self.distortion
+        )
+        return pixels.reshape(-1, 2)
+
+    def rays(self, pixels: ArrayLike) -> Array:
+        """Undistorted normalised image coordinates (n, 2) of pixels (n, 2): the ray is (x, y, 1)."""
+        flat = np.ascontiguousarray(pixels, float).reshape(-1, 1, 2)
+        if not np.any(self.distortion):
+            k = self.camera_matrix
+            y = (flat[:, 0, 1] - k[1, 2]) / k[1, 1]
+            return np.stack([(flat[:, 0, 0] - k[0, 2] - k[0, 1] * y) / k[0, 0], y], axis=-1)
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
+        return cv2.undistortPointsIter(
+            flat, self.camera_matrix, self.distortion, np.eye(3), np.eye(3), criteria
+        ).reshape(-1, 2)
+
+    @cached_property
+    def ray_map(self) -> NDArray[np.float32]:
+        """(h, w, 2) undistorted normalised coordinates of every pixel's centre; computed once."""
+        width, height = self.image_size
+        x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
+        rays = self.rays(np.stack([x, y], axis=-1).reshape(-1, 2))
+        return rays.reshape(height, width, 2).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A rigid transform from the probe frame to the camera frame."""
+
+    rotation: Array
+    """(3, 3) rotation matrix."""
+    translation: Array
+    """(3,) [mm]."""
+
+    @classmethod
+    def from_rvec(cls, rvec: ArrayLike, translation: ArrayLike) -> "Pose":
+        """From a Rodrigues vector (3,) [rad] and a translation (3,) [mm]."""
+        rotation, _ = cv2.Rodrigues(np.asarray(rvec, float).reshape(3, 1))
+        return cls(rotation, np.asarray(translation, float).reshape(3))
+
+    @property
+    def rvec(self) -> Array:
+        """(3,) Rodrigues vector [rad]."""
+        vector, _ = cv2.Rodrigues(np.asarray(self.rotation, float))
+        return vector.reshape(3)
+
+    @property
+    def camera_centre_mm(self) -> Array:
+        """(3,) where the camera stands in the probe frame [mm]."""
+        return -self.rotation.T @ self.translation
+
+    def transform(self, points_mm: ArrayLike) -> Array:
+        """Points (..., 3) of the probe frame in the camera frame [mm]."""
+        return np.asarray(points_mm, float) @ self.rotation.T + self.translation
+
+    def view_directions(self, points_mm: ArrayLike) -> Array:
+        """Unit vectors (..., 3), probe frame, from points (..., 3) of the probe frame toward the camera."""
+        toward = self.camera_centre_mm - np.asarray(points_mm, float)
+        return toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+
+
+def _check_intrinsics(image_size: tuple[int, int], matrix: Array, distortion: Array) -> None:
+    if len(image_size) != 2 or min(image_size) < 1:
+        raise CameraError(f"image_size must be [width, height] in pixels, found {list(image_size)}")
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+        raise CameraError(f"camera_matrix must be 3x3 and finite, found shape {matrix.shape}")
+    if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or not np.allclose(matrix[2], [0, 0, 1]):
+        raise CameraError("camera_matrix must have positive focal lengths and [0, 0, 1] as its last row")
+    if distortion.size not in (0, 4, 5, 8, 12, 14) or not np.all(np.isfinite(distortion)):
+        raise CameraError(f"distortion must hold 4, 5, 8, 12 or 14 finite numbers, found {distortion.size}")
