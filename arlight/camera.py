@@ -81,8 +81,8 @@ class Camera:
             y = (flat[:, 0, 1] - k[1, 2]) / k[1, 1]
             return np.stack([(flat[:, 0, 0] - k[0, 2] - k[0, 1] * y) / k[0, 0], y], axis=-1)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
-        return cv2.undistortPointsIter(
-            flat, self.camera_matrix, self.distortion, np.eye(3), np.eye(3), criteria
+        return cv2.undistortPoints(
+            flat, self.camera_matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria
         ).reshape(-1, 2)
 
     @cached_property
