@@ -1,0 +1,36 @@
+"""Headless OpenGL: one context to a thread, and the shaders that are shipped beside the package."""
+
+from functools import cache
+from pathlib import Path
+
+import moderngl
+
+from arlight.errors import RenderingUnavailable
+
+_PACKAGES = "libegl1 libgl1-mesa-dri"
+
+
+def create_context() -> moderngl.Context:
+    """A new headless context that belongs to the calling thread.
+
+    Raises:
+        RenderingUnavailable: there is no EGL driver; says which packages to install.
+    """
+    try:
+        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[call-arg]
+    # moderngl and glcontext raise bare Exception when the library or a driver is missing
+    except Exception as error:
+        raise RenderingUnavailable(
+            f"headless OpenGL 3.3 through EGL is needed for rendering and was not found ({error}); "
+            f"on Debian: apt-get install {_PACKAGES}; estimation alone works without it (--no-render)"
+        ) from error
+
+
+@cache
+def shader_source(name: str) -> str:
+    """Text of a shader, such as "object.frag", from the installed package or the source tree."""
+    for folder in (Path(__file__).parent / "shaders", Path(__file__).parent.parent / "shaders"):
+        path = folder / name
+        if path.is_file():
+            return path.read_text()
+    raise RenderingUnavailable(f"the shader {name} is missing from this installation; reinstall arlight")
