@@ -1,0 +1,134 @@
+"""One picture of a video: its planes as decoded, and exact conversion between them and linear light."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from arlight.color import Transfer
+from arlight.video import conversion
+from arlight.video.pixel_format import PixelFormat
+
+FloatImage = NDArray[np.float32]
+Planes = tuple[NDArray[np.uint8] | NDArray[np.uint16], ...]
+
+
+class Region(NamedTuple):
+    """A rectangle of pixels, x0 <= x < x1 and y0 <= y < y1."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self.x1 - self.x0, self.y1 - self.y0
+
+    def grown(self, margin_px: int) -> "Region":
+        """The rectangle with a margin on every side; it may leave the picture."""
+        return Region(self.x0 - margin_px, self.y0 - margin_px, self.x1 + margin_px, self.y1 + margin_px)
+
+    def clipped(self, size: tuple[int, int]) -> "Region":
+        """The part inside a picture of `size` (w, h) [px]; empty where they do not meet."""
+        x0, y0 = min(max(self.x0, 0), size[0]), min(max(self.y0, 0), size[1])
+        return Region(x0, y0, max(x0, min(self.x1, size[0])), max(y0, min(self.y1, size[1])))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One picture, immutable: the planes are read-only views."""
+
+    index: int
+    """Number of the frame in its source, from 0."""
+    time_s: float
+    """Presentation time in the source's own clock [s]; the first frame need not be at 0."""
+    planes: Planes
+    """Arrays (h, w) of codes: (Y, Cb, Cr) with chroma as stored, one grey plane, or (R, G, B)."""
+    format: PixelFormat
+    """What the codes mean."""
+
+    def __post_init__(self) -> None:
+        expected = self.format
+        w, h = self.planes[0].shape[1], self.planes[0].shape[0]
+        chroma = expected.chroma_size((w, h))[::-1]
+        shapes = [(h, w), chroma, chroma][: expected.plane_count]
+        found = [p.shape for p in self.planes]
+        if found != shapes or any(p.dtype != expected.dtype for p in self.planes):
+            raise ValueError(f"planes of {expected} must be {expected.dtype.__name__} of {shapes}, found {found}")
+        views = tuple(p.view() for p in self.planes)
+        for view in views:
+            view.flags.writeable = False
+        object.__setattr__(self, "planes", views)
+
+    @classmethod
+    def from_rgb(
+        cls, image: NDArray[np.uint8], index: int = 0, time_s: float = 0.0, transfer: Transfer = "srgb"
+    ) -> "Frame":
+        """A frame of an image (h, w, 3), uint8, encoded with `transfer`, full range."""
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+            raise ValueError(f"image must be uint8 (h, w, 3), found {image.dtype} {image.shape}")
+        planes = tuple(np.ascontiguousarray(image[..., c]) for c in range(3))
+        return cls(index, time_s, planes, PixelFormat("rgb", True, 8, transfer=transfer))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self.planes[0].shape[1], self.planes[0].shape[0]
+
+    @property
+    def full_region(self) -> Region:
+        """The whole picture."""
+        return Region(0, 0, *self.size)
+
+    def luma(self) -> NDArray[np.uint8]:
+        """Encoded luma (h, w), uint8, 0 black and 255 white; the decoded plane itself where it already is that."""
+        if self.format.matrix == "rgb":
+            return conversion.luma_of_rgb(self.planes, self.format)
+        if self.format.full_range and self.format.bit_depth == 8:
+            return self.planes[0]  # type: ignore[return-value]
+        return conversion.full_range_luma(self.planes[0], self.format)
+
+    def linear_luma(self, region: Region | None = None) -> FloatImage:
+        """Linear light (h, w) of the encoded luma of a region, in [0, 1]; the whole picture by default."""
+        return conversion.linear_luma(self.planes, self.format, self._inside(region))
+
+    def encoded_rgb(self, region: Region | None = None, chroma: conversion.Upsampling = "guided") -> FloatImage:
+        """Encoded R'G'B' (h, w, 3) in [0, 1] of a region; the whole picture by default.
+
+        Args:
+            region: rectangle inside the picture [px].
+            chroma: `guided` upsampling follows luma, `bilinear` does not; see `conversion`.
+        """
+        return conversion.encoded_rgb(self.planes, self.format, self._inside(region), chroma)
+
+    def linear_rgb(self, region: Region | None = None, chroma: conversion.Upsampling = "guided") -> FloatImage:
+        """Linear light (h, w, 3) of a region, 1 is full scale; arguments as in `encoded_rgb`."""
+        return conversion.linear_rgb(self.planes, self.format, self._inside(region), chroma)
+
+    def with_linear_rgb(self, region: Region, linear: ArrayLike) -> "Frame":
+        """The frame with a region's linear light replaced; what did not change keeps its codes bit by bit.
+
+        Args:
+            region: rectangle inside the picture [px].
+            linear: (h, w, 3) of the region, 1 is full scale; clamped to [0, 1].
+
+        Returns:
+            A frame in the same format; a grey frame becomes 4:2:0 colour.
+        """
+        inside = self._inside(region)
+        image = np.ascontiguousarray(linear, np.float32)
+        if image.shape != (inside.size[1], inside.size[0], 3):
+            raise ValueError(f"linear must be (h, w, 3) = {(*inside.size[::-1], 3)}, found {image.shape}")
+        planes, format_ = conversion.with_chroma(self.planes, self.format)
+        return replace(self, planes=conversion.replaced(planes, format_, inside, image), format=format_)
+
+    def _inside(self, region: Region | None) -> Region:
+        if region is None:
+            return self.full_region
+        region = Region(*(int(v) for v in region))
+        if region.clipped(self.size) != region:
+            raise ValueError(f"region {tuple(region)} leaves the picture of {self.size[0]}x{self.size[1]} pixels")
+        return region
