@@ -5,7 +5,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Transfer = Literal["srgb", "bt709", "linear", "gamma22", "gamma28"]
+Transfer = Literal["srgb", "bt709", "linear", "gamma22", "gamma28", "hlg"]
+
+HLG_A, HLG_B, HLG_C = 0.17883277, 0.28466892, 0.55991073
+"""Constants of the camera curve of hybrid log-gamma (ITU-R BT.2100, table 5)."""
 
 
 def linear_from_encoded(encoded: ArrayLike, transfer: Transfer = "srgb") -> NDArray[np.float32]:
@@ -14,7 +17,7 @@ def linear_from_encoded(encoded: ArrayLike, transfer: Transfer = "srgb") -> NDAr
     Args:
         encoded: any shape, 1 is full scale.
         transfer: `srgb` (IEC 61966-2-1), `bt709` (the inverse of the camera curve of BT.709, BT.601 and BT.2020),
-            `linear`, or a pure power.
+            `linear`, a pure power, or `hlg` (the inverse of the camera curve of hybrid log-gamma, BT.2100).
     """
     e = np.clip(np.asarray(encoded, np.float32), 0.0, 1.0)
     match transfer:
@@ -28,6 +31,8 @@ def linear_from_encoded(encoded: ArrayLike, transfer: Transfer = "srgb") -> NDAr
             return e ** np.float32(2.2)
         case "gamma28":
             return e ** np.float32(2.8)
+        case "hlg":
+            return np.where(e <= 0.5, e**2 / 3.0, (np.exp((e - HLG_C) / HLG_A) + HLG_B) / 12.0).astype(np.float32)
 
 
 def encoded_from_linear(linear: ArrayLike, transfer: Transfer = "srgb") -> NDArray[np.float32]:
@@ -44,3 +49,6 @@ def encoded_from_linear(linear: ArrayLike, transfer: Transfer = "srgb") -> NDArr
             return x ** np.float32(1 / 2.2)
         case "gamma28":
             return x ** np.float32(1 / 2.8)
+        case "hlg":
+            upper = HLG_A * np.log(np.maximum(12.0 * x - HLG_B, 1.0)) + HLG_C
+            return np.where(x <= 1.0 / 12.0, np.sqrt(3.0 * x), upper).astype(np.float32)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from arlight.color import Transfer, encoded_from_linear, linear_from_encoded
 from arlight.video import kernels
 from arlight.video.chroma_grid import AxisGrid, axis_grid
-from arlight.video.pixel_format import CHROMA_LOCATIONS, PixelFormat
+from arlight.video.pixel_format import HD_LINES, PixelFormat, chroma_offset_px
 
 Upsampling = Literal["guided", "bilinear"]
 """How chroma stored at a lower resolution is brought to every pixel, at its exact position.
@@ -27,8 +27,6 @@ FloatImage = NDArray[np.float32]
 
 TABLE_SIZE = 4097
 """Entries of a transfer curve's table; linear interpolation in it is good to 2e-7 of full scale."""
-HD_LINES = 720
-"""Untagged pictures with this many lines are BT.709, smaller ones BT.601."""
 
 
 @cache
@@ -84,7 +82,7 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
         return planes, format_
     h, w = planes[0].shape
     colour = PixelFormat(
-        "bt709" if h >= HD_LINES else "bt601", format_.full_range, format_.bit_depth, (1, 1), CHROMA_LOCATIONS["left"],
+        "bt709" if min(w, h) >= HD_LINES else "bt601", format_.full_range, format_.bit_depth, (1, 1), chroma_offset_px("left", (1, 1)),
         format_.transfer,
     )  # fmt: skip
     neutral = np.full(colour.chroma_size((w, h))[::-1], colour.chroma_code_range[0], colour.dtype)

@@ -27,7 +27,21 @@ CHROMA_LOCATIONS: dict[str, tuple[float, float]] = {
     "bottomleft": (0.0, 1.0),
     "bottom": (0.5, 1.0),
 }
-"""Where the first chroma sample of a 4:2:0 picture lies [px of luma, x and y] (ITU-T H.273, figure 6)."""
+"""Where chroma lies between the first (0) and the last (1) luma column and row that share it (ITU-T H.273, figure 6)."""
+
+HD_LINES = 720
+"""Untagged pictures with this many lines are BT.709, smaller ones BT.601."""
+
+
+def chroma_offset_px(location: str, shift: tuple[int, int]) -> tuple[float, float]:
+    """Position (x, y) of the first chroma sample on the luma grid [px].
+
+    Args:
+        location: a key of `CHROMA_LOCATIONS`.
+        shift: log2 of the luma columns and rows that share a chroma sample.
+    """
+    (fx, fy), (sx, sy) = CHROMA_LOCATIONS[location], shift
+    return fx * ((1 << sx) - 1), fy * ((1 << sy) - 1)
 
 
 @dataclass(frozen=True, slots=True)

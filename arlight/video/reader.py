@@ -1,0 +1,191 @@
+"""Reads a video frame by frame, with the stream's own times and colour tags."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+
+import av
+import av.error
+import numpy as np
+
+from arlight.errors import VideoError
+from arlight.video.frame import Frame, Planes
+from arlight.video.orientation import upright
+from arlight.video.pixel_format import PixelFormat
+from arlight.video.stream_format import ColourTags, chroma_location, colour_tags, pixel_format, planar_name
+
+FALLBACK_RATE = Fraction(25)
+"""Frames per second of a stream that states neither a rate nor times."""
+
+
+class VideoReader:
+    """A video file as an iterable of frames, upright, in order of presentation; may be iterated once at a time.
+
+    The first frame is decoded when the reader is opened, so what cannot be read is refused there. A file that is damaged
+    further on yields the frames that are intact and says in `damage` what is missing. Interlaced video is refused.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        """Opens a video and decodes its first frame.
+
+        Raises:
+            VideoError: no such file, not a video, no frame that can be decoded, or colour that is not understood.
+        """
+        self.path = Path(path)
+        """The file."""
+        self.damage: str | None = None
+        """What the last pass over the file could not read, None where it was whole."""
+        self._container = _open(self.path)
+        try:
+            self._stream = self._container.streams.video[0]
+            first = self._first_picture()
+            self.tags: ColourTags = colour_tags(first)
+            """The stream's colour tags, as they stand in it."""
+            self._location = chroma_location(first)
+            self._layout = (first.width, first.height, first.format.name)
+            self._format = self._pixel_format(first)
+            self.size: tuple[int, int] = self._frame(first, 0).size
+            """Width and height of the upright frames [px]."""
+        except BaseException:
+            self._container.close()
+            raise
+
+    @property
+    def format(self) -> PixelFormat:
+        """What the codes of the frames mean, before they are turned upright."""
+        return self._format
+
+    @property
+    def frame_rate(self) -> Fraction:
+        """Average frames per second."""
+        return self._stream.average_rate or self._stream.guessed_rate or FALLBACK_RATE
+
+    @property
+    def time_base(self) -> Fraction:
+        """Unit of the stream's times [s]."""
+        return self._stream.time_base or 1 / self.frame_rate
+
+    @property
+    def frame_count(self) -> int | None:
+        """How many frames the file says it has, an estimate; None where it does not say."""
+        if self._stream.frames:
+            return int(self._stream.frames)
+        if self._stream.duration:
+            return round(self._stream.duration * self.time_base * self.frame_rate)
+        return round(self._container.duration * self.frame_rate / 1_000_000) if self._container.duration else None
+
+    @property
+    def pixel_aspect(self) -> Fraction | None:
+        """Width of a pixel relative to its height, None where the stream does not say."""
+        return self._stream.codec_context.sample_aspect_ratio or None
+
+    def __iter__(self) -> Iterator[Frame]:
+        self.damage = None
+        with _open(self.path) as container:
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            for index, picture in enumerate(self._pictures(container, stream)):
+                yield self._frame(picture, index)
+
+    def __enter__(self) -> "VideoReader":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._container.close()
+
+    def _first_picture(self) -> av.VideoFrame:
+        picture = next(self._pictures(self._container, self._stream), None)
+        if picture is None:
+            reason = f" ({self.damage})" if self.damage else ""
+            raise VideoError(f"{self.path}: no frame can be decoded{reason}; expected at least one: record it again")
+        if picture.interlaced_frame:
+            raise VideoError(
+                f"{self.path}: is interlaced, expected progressive frames: deinterlace it first, for instance with "
+                f"ffmpeg -i {self.path.name} -vf bwdif progressive.mp4"
+            )
+        return picture
+
+    def _pictures(
+        self, container: "av.container.InputContainer", stream: "av.VideoStream"
+    ) -> Iterator[av.VideoFrame]:
+        """Decoded pictures up to the end or the damage; corrupt ones are left out."""
+        broken, decoded = 0, 0
+        packets = container.demux(stream)
+        while True:
+            try:
+                packet = next(packets, None)
+                pictures = [] if packet is None else packet.decode()
+            except av.error.FFmpegError as error:
+                broken += 1
+                self.damage = f"{broken} packets are damaged after frame {decoded}: {error.strerror}"
+                if not isinstance(error, av.error.InvalidDataError):
+                    break
+                continue
+            if packet is None:
+                break
+            for picture in pictures:
+                if picture.is_corrupt:
+                    broken += 1
+                    self.damage = f"{broken} pictures are damaged after frame {decoded}"
+                else:
+                    decoded += 1
+                    yield picture
+
+    def _pixel_format(self, picture: av.VideoFrame) -> PixelFormat:
+        name = planar_name(picture.format.name)
+        codec = self._stream.codec_context.name
+        try:
+            return pixel_format(name, self.tags, self._location, (picture.width, picture.height), codec)
+        except VideoError as error:
+            raise VideoError(f"{self.path}: {error}") from error
+
+    def _frame(self, picture: av.VideoFrame, index: int) -> Frame:
+        layout = (picture.width, picture.height, picture.format.name)
+        if layout != self._layout:
+            raise VideoError(
+                f"{self.path}: expected pictures of {self._layout} throughout, found {layout} at frame {index}; "
+                "cut the video where it changes"
+            )
+        time = picture.pts * picture.time_base if picture.pts is not None else index / self.frame_rate
+        planes, format_ = upright(planes_of(picture, self._format), self._format, picture.rotation)
+        return Frame(index, float(time), planes, format_)
+
+
+def planes_of(picture: av.VideoFrame, format_: PixelFormat) -> Planes:
+    """A picture's components as views (h, w) of its memory, R, G, B or Y, Cb, Cr; alpha is left out."""
+    planar = picture.reformat(format=planar_name(picture.format.name))
+    size = (planar.width, planar.height)
+    sizes = [size, format_.chroma_size(size), format_.chroma_size(size)][: format_.plane_count]
+    stored = (2, 0, 1) if format_.matrix == "rgb" else (0, 1, 2)
+    planes = []
+    for k, (w, h) in zip(stored, sizes, strict=False):
+        plane = planar.planes[k]
+        codes = np.frombuffer(plane, format_.dtype)
+        planes.append(codes.reshape(-1, plane.line_size // codes.itemsize)[:h, :w])
+    return tuple(planes)
+
+
+def _open(path: Path) -> "av.container.InputContainer":
+    if not path.is_file():
+        raise VideoError(f"{path}: expected a video file, found {'a folder' if path.is_dir() else 'nothing'} there")
+    if path.stat().st_size == 0:
+        raise VideoError(f"{path}: is empty (0 bytes), expected a video; record or copy it again")
+    try:
+        container = av.open(str(path))
+    except (av.error.FFmpegError, OSError) as error:
+        raise VideoError(
+            f"{path}: cannot be read as a video ({error.strerror}); it may be cut off or not a video: copy it again or "
+            "convert it with ffmpeg"
+        ) from error
+    if not container.streams.video:
+        container.close()
+        raise VideoError(f"{path}: has no video stream, expected one; name the clip, not its sound or its data")
+    return container
