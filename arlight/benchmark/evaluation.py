@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.benchmark.following import Step, direction_lag, find_step
-from arlight.benchmark.truth import Truth
 from arlight.fourier import frequency_order
 from arlight.results.log import LightingLog, LogError
 from arlight.results.record import LogHeader, LogRecord
+from arlight.synthetic.truth import ClipTruth
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -82,13 +82,13 @@ class Evaluation:
     """False where the clip is too short for ten frames to be left out: the errors are over all its frames."""
 
 
-def evaluate(log: LightingLog, truth: Truth) -> Evaluation:
+def evaluate(log: LightingLog, truth: ClipTruth) -> Evaluation:
     """Compare a log with the truth of its clip.
 
     Raises:
         LogError: the two have no frame or no frequency in common.
     """
-    records = [record for record in log.records if record.frame in truth.frames]
+    records = [record for record in log.records if 0 <= record.frame < len(truth.frames)]
     if not records:
         raise LogError("log and truth have no frame in common; give the truth file of the clip that was run")
     in_log, in_truth = _common_frequencies(log.header.frequencies, truth.frequencies)
@@ -152,7 +152,7 @@ def _coefficients(record: LogRecord, rows: list[int]) -> Complex:
     return padded[rows]
 
 
-def _pose_error(header: LogHeader, records: list[LogRecord], truth: Truth) -> PoseError | None:
+def _pose_error(header: LogHeader, records: list[LogRecord], truth: ClipTruth) -> PoseError | None:
     x, y = (np.linspace(-0.5, 0.5, _SHEET_GRID) * side for side in header.sheet_mm)
     points = np.stack([*np.meshgrid(x, y), np.zeros((_SHEET_GRID, _SHEET_GRID))], axis=-1).reshape(-1, 3)
     squared = []

@@ -1,17 +1,18 @@
 """The figures of an evaluation, against errors that were put in."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from arlight.benchmark.evaluation import evaluate
-from arlight.benchmark.truth import TrueFrame, Truth
 from arlight.camera import Camera, Pose
 from arlight.fourier import frequency_order, half_plane_frequencies
 from arlight.optics import Slab
 from arlight.results.log import LightingLog, LogError
 from arlight.results.record import LogHeader, LogRecord
+from arlight.synthetic.truth import ClipTruth, FrameTruth
 
 FREQUENCIES = half_plane_frequencies(2)
 ORDERS = frequency_order(FREQUENCIES)
@@ -32,8 +33,8 @@ def record_of(frame: int, coefficients, pose=POSE, status="tracked") -> LogRecor
     return LogRecord(frame, frame / 30, status, pose, 0.05, coefficients, None, 2, 1.5, {"track": 1.0, "render": 3.0})
 
 
-def truth_of(frames: int = FRAMES) -> Truth:
-    return Truth(FREQUENCIES, {i: TrueFrame(POSE, true_light(), i / 30) for i in range(frames)})
+def truth_of(frames: int = FRAMES) -> ClipTruth:
+    return ClipTruth("hall", FREQUENCIES, tuple(FrameTruth(POSE, true_light(), 1.0, i / 30) for i in range(frames)))
 
 
 def log_of(records) -> LightingLog:
@@ -113,10 +114,8 @@ def test_coasting_frames_do_not_count_for_the_pose():
 
 def test_only_common_frequencies_are_compared_in_whatever_order():
     truth = truth_of()
-    reversed_truth = Truth(
-        FREQUENCIES[::-1][2:],
-        {i: TrueFrame(f.pose, f.coefficients[::-1][2:], f.time_s) for i, f in truth.frames.items()},
-    )
+    turned = tuple(replace(frame, coefficients=frame.coefficients[::-1][2:]) for frame in truth.frames)
+    reversed_truth = ClipTruth("hall", FREQUENCIES[::-1][2:], turned)
     result = evaluate(log_of([record_of(i, true_light()) for i in range(FRAMES)]), reversed_truth)
     assert all(error.relative_to_l0 == 0.0 for error in result.orders)
 
