@@ -1,0 +1,154 @@
+"""Draws the lit object's own box of the frame with OpenGL, anti-aliased, as linear premultiplied radiance and coverage."""
+
+import threading
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.gl import create_context, shader_source
+from arlight.rendering.gloss import GLOSS_SIDE
+from arlight.rendering.mesh import Mesh
+
+Image = NDArray[np.float32]
+
+
+class ObjectRenderer:
+    """OpenGL state of one object. It belongs to the thread that made it and refuses the others."""
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        openness: NDArray[np.float32],
+        roughness: float,
+        normal_reflectance: float,
+        supersampling: int = 2,
+    ) -> None:
+        """Upload the mesh.
+
+        Args:
+            mesh: placed, probe frame [mm].
+            openness: (n, 9) harmonics of each vertex's visibility.
+            roughness: of the gloss, in [0.05, 1].
+            normal_reflectance: Fresnel reflectance at normal incidence, 0 for a matte object.
+            supersampling: samples along a pixel's side.
+
+        Raises:
+            RenderingUnavailable: no headless OpenGL.
+        """
+        self._thread = threading.get_ident()
+        self._samples = supersampling
+        self._context = create_context()
+        self._program = self._context.program(
+            vertex_shader=shader_source("object.vert"), fragment_shader=shader_source("object.frag")
+        )
+        self._set("roughness", roughness)
+        self._set("normal_reflectance", normal_reflectance)
+        self._gloss = self._context.texture((GLOSS_SIDE, GLOSS_SIDE), 3, dtype="f4")
+        self._gloss.repeat_x = self._gloss.repeat_y = False
+        self._textures = self._upload_textures(mesh)
+        self._clip = self._context.buffer(reserve=16 * len(mesh.vertices_mm), dynamic=True)
+        self._diffuse = self._context.buffer(reserve=12 * len(mesh.vertices_mm), dynamic=True)
+        self._triangles = self._context.vertex_array(
+            self._program,
+            [
+                (self._clip, "4f", "clip"),
+                (self._diffuse, "3f", "diffuse_radiance"),
+                (
+                    self._context.buffer(_static_attributes(mesh, openness)),
+                    "3f 3f 3f 3f 3f 3f 3f",
+                    "position_mm",
+                    "normal",
+                    "base_colour",
+                    "texture_place",
+                    "openness_0",
+                    "openness_1",
+                    "openness_2",
+                ),
+            ],
+            self._context.buffer(np.ascontiguousarray(mesh.faces, np.int32)),
+        )
+        self._target: moderngl.Framebuffer | None = None
+
+    def draw(
+        self,
+        clip: NDArray[np.float32],
+        diffuse_radiance: NDArray[np.float32],
+        gloss: NDArray[np.float32],
+        eye_mm: NDArray[np.float64],
+        size: tuple[int, int],
+    ) -> Image:
+        """One picture of the object.
+
+        Args:
+            clip: (n, 4) clip coordinates for a viewport of `size`.
+            diffuse_radiance: (n, 3) radiance of a white matte surface at each vertex.
+            gloss: (side * side, 3) octahedral map of lobe-averaged radiance.
+            eye_mm: (3,) the camera's centre, probe frame [mm].
+            size: width and height of the viewport [px].
+
+        Returns:
+            (h, w, 4) linear radiance times coverage, and coverage.
+
+        Raises:
+            RuntimeError: called from another thread than the one that made it.
+        """
+        if threading.get_ident() != self._thread:
+            raise RuntimeError("an OpenGL context belongs to its thread: draw from the thread that made the renderer")
+        width, height = size[0] * self._samples, size[1] * self._samples
+        target = self._target_of(width, height)
+        target.use()
+        target.viewport = (0, 0, width, height)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        target.clear(viewport=(0, 0, width, height))
+        self._clip.write(np.ascontiguousarray(clip, np.float32))
+        self._diffuse.write(np.ascontiguousarray(diffuse_radiance, np.float32))
+        self._gloss.write(np.ascontiguousarray(gloss, np.float32))
+        self._set("eye_mm", tuple(float(v) for v in eye_mm))
+        self._gloss.use(0)
+        self._set("gloss", 0)
+        if self._textures is not None:
+            self._textures.use(1)
+            self._set("base_texture", 1)
+        self._triangles.render()
+        pixels = np.frombuffer(target.read((0, 0, width, height), 4, dtype="f4"), np.float32)
+        fine = pixels.reshape(size[1], self._samples, size[0], self._samples, 4)
+        return fine.mean(axis=(1, 3))
+
+    def release(self) -> None:
+        """Give the context back; the renderer cannot be used after."""
+        self._context.release()
+
+    def _set(self, name: str, value: object) -> None:
+        # a driver drops uniforms whose value cannot matter
+        if name in self._program:
+            self._program[name] = value
+
+    def _target_of(self, width: int, height: int) -> moderngl.Framebuffer:
+        held = self._target
+        if held is None or held.width < width or held.height < height:
+            size = (max(width, held.width if held else 0), max(height, held.height if held else 0))
+            self._target = self._context.framebuffer(
+                self._context.renderbuffer(size, 4, dtype="f4"), self._context.depth_renderbuffer(size)
+            )
+            return self._target
+        return held
+
+    def _upload_textures(self, mesh: Mesh) -> moderngl.TextureArray | None:
+        self._set("has_texture", mesh.textures is not None)
+        if mesh.textures is None:
+            return None
+        layers, height, width = mesh.textures.shape[:3]
+        # row 0 of an OpenGL texture is v = 0, its bottom
+        data = np.ascontiguousarray(mesh.textures[:, ::-1])
+        textures = self._context.texture_array((width, height, layers), 3, data, alignment=1)
+        textures.build_mipmaps()
+        return textures
+
+
+def _static_attributes(mesh: Mesh, openness: NDArray[np.float32]) -> NDArray[np.float32]:
+    place = np.zeros((len(mesh.vertices_mm), 3), np.float32)
+    if mesh.uv is not None and mesh.layer is not None:
+        place[:, :2], place[:, 2] = mesh.uv, mesh.layer
+    columns = [mesh.vertices_mm, mesh.normals, mesh.base_colour, place, openness]
+    return np.ascontiguousarray(np.concatenate(columns, axis=1), np.float32)

@@ -1,0 +1,179 @@
+"""Lights an object on the sheet with estimated coefficients and sets it into the frame."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from arlight.camera import Camera, Pose
+from arlight.estimation.lighting import Lighting
+from arlight.fourier import pack_real
+from arlight.optics import Slab
+from arlight.rendering.composite import cover, shade_plane
+from arlight.rendering.draw import ObjectRenderer
+from arlight.rendering.gloss import gloss_rows
+from arlight.rendering.mesh import Mesh
+from arlight.rendering.projection import clip_coordinates, covered_region, union
+from arlight.rendering.reconstruction import reconstruct
+from arlight.rendering.transfer import precompute_transfer
+from arlight.rendering.visibility import Progress
+from arlight.video.frame import Frame, Region
+
+_DARKENING = 0.002
+"""A shadow that takes less than this share of the light is below half an 8-bit level and is not drawn."""
+
+
+class ProbeGlass(Protocol):
+    """What of a probe the light's reconstruction depends on."""
+
+    @property
+    def slab(self) -> Slab:
+        """The glass between film and paper."""
+
+    @property
+    def frequencies(self) -> NDArray[np.int64]:
+        """(k, 2) frequencies that the sheet measures."""
+
+
+@dataclass(frozen=True, slots=True)
+class RelightSettings:
+    """How the object stands on the sheet and how it is lit."""
+
+    size_mm: float = 60.0
+    """Largest side of the object's bounding box [mm]."""
+    position_mm: tuple[float, float] = (0.0, 0.0)
+    """Where the middle of the object stands, probe frame [mm]."""
+    yaw_deg: float = 0.0
+    """Turn of the object about the sheet's normal, counter-clockwise from above [deg]."""
+    roughness: float = 0.3
+    """Perceptual roughness of the gloss, in [0.05, 1]."""
+    normal_reflectance: float = 0.04
+    """Fresnel reflectance at normal incidence: 0.04 a varnish, 0 a matte object."""
+    surroundings_albedo: float = 0.3
+    """ASSUMED albedo of what surrounds the object: light from below is this over pi times the irradiance, in [0, 1]."""
+    directions: int = 768
+    """Directions of the hemisphere along which the object's shadows are cast."""
+    shadow_texels: int = 128
+    """Side of the map of the shadow on the sheet."""
+    supersampling: int = 2
+    """Samples along a pixel's side."""
+
+
+class Relighter:
+    """An object on the sheet, ready to be lit: everything that does not depend on the light or the view is done once.
+
+    `render` opens an OpenGL context in the thread that first calls it and refuses other threads from then on;
+    building it in one thread and rendering in another is fine.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        probe: ProbeGlass,
+        camera: Camera,
+        settings: RelightSettings | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Cast the object's shadows and fold them into matrices; takes seconds.
+
+        Args:
+            mesh: any object; it is scaled and placed by the settings.
+            probe: the sheet; gives the glass and the frequencies of the coefficients.
+            camera: intrinsics of the frames to come.
+            settings: placement, material, sampling.
+            progress: called with the share of the precomputation done, from 0 to 1.
+
+        Raises:
+            MeshError: the object cannot be placed.
+            RenderingUnavailable: no headless OpenGL.
+        """
+        self.settings = settings or RelightSettings()
+        s = self.settings
+        self._camera = camera
+        self._frequencies = np.asarray(probe.frequencies)
+        self.mesh = mesh.placed(s.size_mm, s.position_mm, s.yaw_deg)
+        reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
+        self.transfer = precompute_transfer(self.mesh, reconstruction, s.directions, s.shadow_texels, progress)
+        self._gloss_rows = gloss_rows(reconstruction, s.roughness)
+        self._renderer: ObjectRenderer | None = None
+
+    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
+        """The frame with the lit object in it.
+
+        Args:
+            frame: the recorded frame.
+            camera_from_probe: the pose; None where the sheet is lost.
+            lighting: the light; None before the first estimate.
+
+        Returns:
+            A new frame; the one given where pose or light is missing: nothing is drawn that is not lit by measurement.
+
+        Raises:
+            ValueError: frame or lighting do not fit what the relighter was made for.
+            RuntimeError: called from another thread than before.
+        """
+        if camera_from_probe is None or lighting is None:
+            return frame
+        if frame.size != self._camera.image_size:
+            raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
+        packed = self._packed(lighting)
+        ratio = self.transfer.shadow.ratio(packed)
+        box = covered_region(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        region = union(box, self._shadow_region(camera_from_probe, ratio))
+        if region is None:
+            return frame
+        linear = frame.linear_rgb(region)
+        shade_plane(linear, region, self._camera, camera_from_probe, self.transfer.shadow.grid, ratio)
+        if box is not None:
+            drawn = self._draw(camera_from_probe, packed, box)
+            cover(linear, box.x0 - region.x0, box.y0 - region.y0, drawn)
+        return frame.with_linear_rgb(region, linear)
+
+    def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
+        """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
+        box = covered_region(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        return None if box is None else (box, self._draw(camera_from_probe, self._packed(lighting), box))
+
+    def release(self) -> None:
+        """Close the OpenGL context, from the thread that renders; it is opened again when needed."""
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
+
+    def _draw(self, camera_from_probe: Pose, packed: NDArray[np.float32], box: Region) -> NDArray[np.float32]:
+        if self._renderer is None:
+            s = self.settings
+            self._renderer = ObjectRenderer(
+                self.mesh, self.transfer.openness, s.roughness, s.normal_reflectance, s.supersampling
+            )
+        return self._renderer.draw(
+            clip_coordinates(self._camera, camera_from_probe, self.mesh.vertices_mm, box),
+            self.transfer.vertex_rows @ packed,
+            self._gloss_rows @ packed,
+            camera_from_probe.camera_centre_mm,
+            box.size,
+        )
+
+    def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
+        if not np.array_equal(lighting.frequencies, self._frequencies):
+            raise ValueError(
+                f"the lighting has {len(lighting.frequencies)} frequencies that are not the sheet's "
+                f"{len(self._frequencies)}; make the relighter with the probe that the lighting was estimated on"
+            )
+        return pack_real(lighting.coefficients).astype(np.float32)
+
+    def _shadow_region(self, camera_from_probe: Pose, ratio: ArrayLike) -> Region | None:
+        """Pixels that see the darkened part of the plane."""
+        dark = np.min(ratio, axis=2) < 1.0 - _DARKENING
+        rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
+        if len(rows) == 0:
+            return None
+        grid = self.transfer.shadow.grid
+        x = grid.corner_mm[0] + np.array([columns[0] - 0.5, columns[-1] + 1.5]) * grid.texel_mm
+        y = grid.corner_mm[1] + np.array([rows[0] - 0.5, rows[-1] + 1.5]) * grid.texel_mm
+        # the outline in steps: a lens bends it
+        share = np.linspace(0.0, 1.0, 9)
+        along_x, along_y = x[0] + share * (x[1] - x[0]), y[0] + share * (y[1] - y[0])
+        outline = [(px, py, 0.0) for px in along_x for py in y] + [(px, py, 0.0) for py in along_y for px in x]
+        return covered_region(self._camera, camera_from_probe, np.array(outline), margin_px=1)

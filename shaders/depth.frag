@@ -1,0 +1,3 @@
+#version 330
+// Only the depth is kept.
+void main() {}
