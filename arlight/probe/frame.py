@@ -22,7 +22,7 @@ _MARKER_PITCH_MM = 48.0
 # the dictionary has fifty
 _MOST_GAPS = 12
 _STEP_MM = 9.0
-_STEP_SPACING_MM = 10.0
+_STEP_GAP_MM = 1.0
 _WEDGE_STEPS = 12
 _FEWEST_STEPS = 8
 # camera blur reaches over the edge of a step
@@ -100,10 +100,8 @@ def place_wedge(frame: Frame, first_id: int) -> tuple[Block, ...]:
     """
     places = _step_places(frame)
     paired = len(places) >= 2 * _FEWEST_STEPS
-    available = places[: len(places) // 2] if paired else places
-    steps = min(_WEDGE_STEPS, len(available))
-    chosen = [available[i * len(available) // steps] for i in range(steps)]
-    values = _reflectances(steps)
+    chosen = places[: len(places) // 2] if paired else places
+    values = _reflectances(len(chosen))
     if paired:
         width, height = frame.sheet_px
         chosen, values = chosen + [(width - x, height - y) for x, y in chosen], values * 2
@@ -120,28 +118,30 @@ def _step_px(frame: Frame) -> int:
 
 
 def _step_places(frame: Frame) -> list[tuple[int, int]]:
-    """Centres of the places for wedge steps, clockwise from the sheet's top left [px]."""
+    """Centres of the wedge steps, clockwise from the sheet's top left, the fewest a gap that suffice [px]."""
     width, height = frame.sheet_px
     middle = frame.quiet_px + frame.marker_px // 2
-    across, down = _between(frame, width), _between(frame, height)
+    for most in range(1, _WEDGE_STEPS):
+        across, down = _between(frame, width, most), _between(frame, height, most)
+        if len(across) + len(down) >= _WEDGE_STEPS:
+            break
     return (
         [(x, middle) for x in across]
         + [(width - middle, y) for y in down]
-        + [(x, height - middle) for x in reversed(across)]
-        + [(middle, y) for y in reversed(down)]
+        + [(width - x, height - middle) for x in across]
+        + [(middle, height - y) for y in down]
     )
 
 
-def _between(frame: Frame, side_px: int) -> list[int]:
-    """Centres of steps along a side: as many as each gap between two markers' quiet zones takes."""
+def _between(frame: Frame, side_px: int, most: int) -> list[int]:
+    """Centres of steps along a side, evenly in each gap between two markers' quiet zones, at most so many a gap."""
     places: list[int] = []
-    step, spacing = _step_px(frame), round(_STEP_SPACING_MM * frame.pixels_per_mm)
-    starts = _side_places(frame, side_px)
-    for start, following in pairwise(starts):
+    step, apart = _step_px(frame), ceil(_STEP_GAP_MM * frame.pixels_per_mm)
+    for start, following in pairwise(_side_places(frame, side_px)):
         low, high = start + frame.marker_px + frame.quiet_px, following - frame.quiet_px
-        count = (high - low - step) // spacing + 1
-        first = (low + high - (count - 1) * spacing) // 2
-        places += [first + i * spacing for i in range(count)]
+        count = min(most, (high - low + apart) // (step + apart))
+        blank = (high - low - count * step) / (count + 1)
+        places += [low + round((i + 1) * blank + (i + 0.5) * step) for i in range(count)]
     return places
 
 
