@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 class AxisGrid(NamedTuple):
     """One axis of a region: how its pixels read chroma, and how its chroma samples average pixels.
 
-    Down: a box as wide as a chroma sample's share of the picture, centred on the sample (so 1 2 1 where chroma lies on a
-    luma column, 1 1 where it lies between two). Up: linear interpolation. Both repeat the picture's edge.
+    Down: a box as wide as a chroma sample's share of the picture, centred on the sample (so 1 2 1 where chroma lies on
+    a luma column, 1 1 where it lies between two). Up: linear interpolation. Both repeat the picture's edge.
     """
 
     start: int

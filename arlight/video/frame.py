@@ -8,10 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from arlight.color import Transfer
 from arlight.video import conversion
+from arlight.video.conversion import FloatImage, Planes
 from arlight.video.pixel_format import PixelFormat
-
-FloatImage = NDArray[np.float32]
-Planes = tuple[NDArray[np.uint8] | NDArray[np.uint16], ...]
 
 
 class Region(NamedTuple):
@@ -85,11 +83,7 @@ class Frame:
 
     def luma(self) -> NDArray[np.uint8]:
         """Encoded luma (h, w), uint8, 0 black and 255 white; the decoded plane itself where it already is that."""
-        if self.format.matrix == "rgb":
-            return conversion.luma_of_rgb(self.planes, self.format)
-        if self.format.full_range and self.format.bit_depth == 8:
-            return self.planes[0]  # type: ignore[return-value]
-        return conversion.full_range_luma(self.planes[0], self.format)
+        return conversion.full_range_luma(self.planes, self.format)
 
     def linear_luma(self, region: Region | None = None) -> FloatImage:
         """Linear light (h, w) of the encoded luma of a region, in [0, 1]; the whole picture by default."""
@@ -124,6 +118,10 @@ class Frame:
             raise ValueError(f"linear must be (h, w, 3) = {(*inside.size[::-1], 3)}, found {image.shape}")
         planes, format_ = conversion.with_chroma(self.planes, self.format)
         return replace(self, planes=conversion.replaced(planes, format_, inside, image), format=format_)
+
+    def converted(self, target: PixelFormat) -> "Frame":
+        """The frame in another Y'CbCr format of the same transfer, for an encoder that cannot take its own."""
+        return replace(self, planes=conversion.converted(self.planes, self.format, target), format=target)
 
     def _inside(self, region: Region | None) -> Region:
         if region is None:

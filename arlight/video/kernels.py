@@ -1,4 +1,8 @@
-"""The inner loops of colour conversion, compiled. Planes are codes; Y', Cb, Cr and R'G'B' are float, 1 is full scale."""
+"""The inner loops of colour conversion, compiled. Planes hold codes; Y', Cb, Cr and R'G'B' are float32.
+
+Tables are curves over [0, 1], evenly spaced, with their last entry repeated so that the entry after 1 exists. Indices are
+unsigned: the compiler then leaves out Python's wrap-around.
+"""
 
 import numpy as np
 from numba import njit
@@ -6,83 +10,116 @@ from numba import njit
 MIN_LUMA = np.float32(0.02)
 """Below this luma, relative to white, chroma is no longer scaled by it: there the ratio is noise."""
 MAX_GAIN = np.float32(2.0)
-"""Chroma follows luma at most by this factor upward; the ratio of box means seldom exceeds it."""
+"""Chroma follows luma at most by this factor upward; grey stripes seldom reach it, coloured edges would pass it."""
 UNCHANGED = np.float32(1e-5)
-"""Linear light within this of what a pixel had is not a change: a thirtieth of an 8-bit level in the dark."""
+"""Linear light within this of what a pixel had is no change: a thirtieth of an 8-bit level in the dark."""
+ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 
 
 @njit(cache=True)
 def interpolate(table, position):
     """Linear interpolation in a table over [0, 1]; clamps."""
-    last = table.size - 1
-    if not position > 0.0:
-        return table[0]
-    if position >= 1.0:
-        return table[last]
-    x = position * np.float32(last)
-    i = np.int32(x)
-    return table[i] + (table[i + 1] - table[i]) * (x - np.float32(i))
+    x = min(ONE, max(ZERO, position)) * np.float32(table.size - 2)
+    i = np.uint32(x)
+    return table[i] + (table[i + np.uint32(1)] - table[i]) * (x - np.float32(i))
 
 
 @njit(cache=True)
 def chroma_means(plane, black, scale, columns, column_weights, rows, row_weights):
     """Luma as chroma sees it: averaged with the chroma filter at each chroma sample."""
+    first = columns.min()
+    line = np.empty(columns.max() - first + 1, np.float32)
     out = np.empty((rows.shape[0], columns.shape[0]), np.float32)
-    for r in range(rows.shape[0]):
-        for c in range(columns.shape[0]):
-            total = np.float32(0.0)
-            for j in range(row_weights.size):
-                line = np.float32(0.0)
-                for i in range(column_weights.size):
-                    line += column_weights[i] * np.float32(plane[rows[r, j], columns[c, i]])
-                total += row_weights[j] * line
-            out[r, c] = (total - black) * scale
+    for r in range(out.shape[0]):
+        line[:] = -black
+        for j in range(row_weights.size):
+            codes, weight = plane[rows[r, j]], row_weights[j]
+            for x in range(line.size):
+                line[x] += weight * np.float32(codes[first + x])
+        for c in range(out.shape[1]):
+            total = ZERO
+            for i in range(column_weights.size):
+                total += column_weights[i] * line[columns[c, i] - first]
+            out[r, c] = total * scale
     return out
 
 
 @njit(cache=True)
 def full_resolution(luma, cb, cr, black, scale, neutral, chroma_scale, luma_low, guided, columns, rows):
-    """Y', Cb, Cr (h, w, 3) at every pixel of a region, not clamped; see `conversion.Upsampling`."""
+    """Y', Cb, Cr (h, w, 3) at every pixel of a region, not clamped; see `conversion.Upsampling`.
+
+    Args:
+        luma_low: `chroma_means` of the region where `guided`, else not read.
+        columns, rows: the region's `AxisGrid`s.
+    """
     x0, cx0, count, left, right, weight_x = columns[:6]
     y0, cy0, _, above, below, weight_y = rows[:6]
     out = np.empty((above.size, left.size, 3), np.float32)
-    line = np.empty((3, count), np.float32)
+    line = np.zeros((3, count), np.float32)
     for y in range(above.size):
-        wy = weight_y[y]
-        a, b = above[y], below[y]
+        wy, a, b = weight_y[y], above[y], below[y]
         for c in range(count):
-            u = np.float32(cb[cy0 + a, cx0 + c])
-            v = np.float32(cr[cy0 + a, cx0 + c])
+            u, v = np.float32(cb[cy0 + a, cx0 + c]), np.float32(cr[cy0 + a, cx0 + c])
             line[0, c] = (u + wy * (np.float32(cb[cy0 + b, cx0 + c]) - u) - neutral) * chroma_scale
             line[1, c] = (v + wy * (np.float32(cr[cy0 + b, cx0 + c]) - v) - neutral) * chroma_scale
             if guided:
                 line[2, c] = luma_low[a, c] + wy * (luma_low[b, c] - luma_low[a, c])
         for x in range(left.size):
-            l, r, wx = left[x], right[x], weight_x[x]  # noqa: E741
+            i, j, wx = np.uint32(left[x]), np.uint32(right[x]), weight_x[x]
             value = (np.float32(luma[y0 + y, x0 + x]) - black) * scale
-            gain = np.float32(1.0)
+            gain = ONE
             if guided:
-                low = line[2, l] + wx * (line[2, r] - line[2, l])
+                low = line[2, i] + wx * (line[2, j] - line[2, i])
                 gain = min(MAX_GAIN, max(value, MIN_LUMA) / max(low, MIN_LUMA))
             out[y, x, 0] = value
-            out[y, x, 1] = gain * (line[0, l] + wx * (line[0, r] - line[0, l]))
-            out[y, x, 2] = gain * (line[1, l] + wx * (line[1, r] - line[1, l]))
+            out[y, x, 1] = gain * (line[0, i] + wx * (line[0, j] - line[0, i]))
+            out[y, x, 2] = gain * (line[1, i] + wx * (line[1, j] - line[1, i]))
     return out
 
 
 @njit(cache=True)
-def to_rgb(image, matrix, table):
-    """Y'CbCr (h, w, 3) to R'G'B' through `table` (values over [0, 1]), in place."""
-    for y in range(image.shape[0]):
-        for x in range(image.shape[1]):
-            a, b, c = image[y, x, 0], image[y, x, 1], image[y, x, 2]
-            for k in range(3):
-                image[y, x, k] = interpolate(table, matrix[k, 0] * a + matrix[k, 1] * b + matrix[k, 2] * c)
+def stack(first, second, third, x0, y0, x1, y1, black, scale):
+    """A region (h, w, 3) of three full planes of codes as values, not clamped."""
+    out = np.empty((y1 - y0, x1 - x0, 3), np.float32)
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            out[y, x, 0] = (np.float32(first[y0 + y, x0 + x]) - black) * scale
+            out[y, x, 1] = (np.float32(second[y0 + y, x0 + x]) - black) * scale
+            out[y, x, 2] = (np.float32(third[y0 + y, x0 + x]) - black) * scale
+    return out
 
 
 @njit(cache=True)
-def scaled(plane, x0, y0, x1, y1, black, scale, table):
-    """A region of codes as values through `table`."""
+def row_product(matrix, k, a, b, c):
+    """Component k of matrix @ (a, b, c)."""
+    return matrix[k, 0] * a + matrix[k, 1] * b + matrix[k, 2] * c
+
+
+@njit(cache=True)
+def to_rgb(image, matrix, table):
+    """Y'CbCr (h, w, 3) to R'G'B' through `table`, in place."""
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            a, b, c = image[y, x, 0], image[y, x, 1], image[y, x, 2]
+            image[y, x, 0] = interpolate(table, row_product(matrix, 0, a, b, c))
+            image[y, x, 1] = interpolate(table, row_product(matrix, 1, a, b, c))
+            image[y, x, 2] = interpolate(table, row_product(matrix, 2, a, b, c))
+
+
+@njit(cache=True)
+def recombine(image, matrix):
+    """Multiplies every pixel (h, w, 3) by a matrix, in place."""
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            a, b, c = image[y, x, 0], image[y, x, 1], image[y, x, 2]
+            image[y, x, 0] = row_product(matrix, 0, a, b, c)
+            image[y, x, 1] = row_product(matrix, 1, a, b, c)
+            image[y, x, 2] = row_product(matrix, 2, a, b, c)
+
+
+@njit(cache=True)
+def through_table(plane, x0, y0, x1, y1, black, scale, table):
+    """A region (h, w) of codes as values through `table`."""
     out = np.empty((y1 - y0, x1 - x0), np.float32)
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
@@ -91,81 +128,113 @@ def scaled(plane, x0, y0, x1, y1, black, scale, table):
 
 
 @njit(cache=True)
-def quantised(plane, black, scale):
+def to_bytes(plane, black, scale):
     """Codes as uint8, 0 black and 255 white."""
     out = np.empty(plane.shape, np.uint8)
+    factor = scale * np.float32(255.0)
     for y in range(plane.shape[0]):
         for x in range(plane.shape[1]):
-            value = (np.float32(plane[y, x]) - black) * scale * np.float32(255.0) + np.float32(0.5)
-            out[y, x] = np.uint8(min(np.float32(255.0), max(np.float32(0.0), value)))
+            value = (np.float32(plane[y, x]) - black) * factor + HALF
+            out[y, x] = np.uint8(min(np.float32(255.0), max(ZERO, value)))
+    return out
+
+
+@njit(cache=True)
+def weighted_bytes(first, second, third, weights, black, scale):
+    """Weighted sum of three planes of codes as uint8, 0 black and 255 white."""
+    out = np.empty(first.shape, np.uint8)
+    factor = scale * np.float32(255.0)
+    a, b, c = weights
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            code = a * np.float32(first[y, x]) + b * np.float32(second[y, x]) + c * np.float32(third[y, x])
+            out[y, x] = np.uint8(min(np.float32(255.0), max(ZERO, (code - black) * factor + HALF)))
     return out
 
 
 @njit(cache=True)
 def replace_pixels(ycc, left, top, linear, to_rgb_matrix, to_ycc_matrix, decode, encode):
-    """Puts new linear light (h, w, 3) at (left, top) of Y'CbCr (h, w, 3), in place.
+    """Puts new linear light (h, w, 3) at (left, top) of Y'CbCr (h, w, 3), in place, where it differs from what is there.
+
+    Args:
+        decode: table from encoded values to linear light.
+        encode: table from the square root of linear light to encoded values.
 
     Returns:
         Which pixels changed (h, w), 1 or 0.
     """
     changed = np.zeros(ycc.shape[:2], np.uint8)
-    encoded = np.empty(3, np.float32)
     for y in range(linear.shape[0]):
         for x in range(linear.shape[1]):
-            pixel = ycc[top + y, left + x]
+            pixel, new = ycc[top + y, left + x], linear[y, x]
             a, b, c = pixel[0], pixel[1], pixel[2]
             differs = False
             for k in range(3):
-                own = interpolate(decode, to_rgb_matrix[k, 0] * a + to_rgb_matrix[k, 1] * b + to_rgb_matrix[k, 2] * c)
-                differs = differs or not abs(linear[y, x, k] - own) <= UNCHANGED
+                own = interpolate(decode, row_product(to_rgb_matrix, k, a, b, c))
+                # written so that a value that is not a number counts as no change
+                differs = differs or abs(new[k] - own) > UNCHANGED
             if differs:
                 changed[top + y, left + x] = 1
+                r = interpolate(encode, np.sqrt(max(new[0], ZERO)))
+                g = interpolate(encode, np.sqrt(max(new[1], ZERO)))
+                b = interpolate(encode, np.sqrt(max(new[2], ZERO)))
                 for k in range(3):
-                    encoded[k] = interpolate(encode, np.sqrt(max(linear[y, x, k], np.float32(0.0))))
-                for k in range(3):
-                    pixel[k] = (
-                        to_ycc_matrix[k, 0] * encoded[0]
-                        + to_ycc_matrix[k, 1] * encoded[1]
-                        + to_ycc_matrix[k, 2] * encoded[2]
-                    )
+                    pixel[k] = row_product(to_ycc_matrix, k, r, g, b)
     return changed
 
 
 @njit(cache=True)
-def write_plane(plane, x0, y0, values, changed, zero, scale, top_code):
-    """Rounds values (h, w) into a plane at (x0, y0) where `changed`."""
+def write_plane(plane, x0, y0, values, channel, changed, zero, scale, top_code):
+    """Rounds one channel of values (h, w, 3) into a plane at (x0, y0) where `changed`."""
     for y in range(values.shape[0]):
         for x in range(values.shape[1]):
             if changed[y, x]:
-                code = np.floor(values[y, x] * scale + zero + np.float32(0.5))
-                plane[y0 + y, x0 + x] = plane.dtype.type(min(top_code, max(np.float32(0.0), code)))
+                code = np.floor(values[y, x, channel] * scale + zero + HALF)
+                plane[y0 + y, x0 + x] = np.uint16(min(top_code, max(ZERO, code)))
 
 
 @njit(cache=True)
-def write_chroma(plane, own, new, changed, x0, y0, columns, rows, zero, scale, top_code):
-    """Averages new chroma into the samples whose pixels changed.
+def write_chroma(plane, own, new, channel, changed, x0, y0, columns, rows, zero, scale, top_code):
+    """Averages one channel of new chroma (h, w, 3) into the samples whose pixels changed.
 
-    What upsampling left unexplained in a sample (its code against the mean of its own pixels) stays in the share of pixels
-    that did not change.
+    What upsampling left unexplained of a sample (its code against the mean of its own pixels) stays, in the share of
+    pixels that did not change. Samples that average pixels outside the region's array are left alone.
     """
-    cx0, cy0 = columns[1], rows[1]
-    taps_x, weights_x, taps_y, weights_y = columns[6], columns[7], rows[6], rows[7]
+    cx0, taps_x, weights_x = columns[1], columns[6], columns[7]
+    cy0, taps_y, weights_y = rows[1], rows[6], rows[7]
     for r in range(taps_y.shape[0]):
+        if taps_y[r, 0] < y0 or taps_y[r, -1] >= y0 + own.shape[0]:
+            continue
         for c in range(taps_x.shape[0]):
-            share, before, after = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            inside = True
+            if taps_x[c, 0] < x0 or taps_x[c, -1] >= x0 + own.shape[1]:
+                continue
+            share, before, after = ZERO, ZERO, ZERO
             for j in range(weights_y.size):
                 for i in range(weights_x.size):
                     y, x = taps_y[r, j] - y0, taps_x[c, i] - x0
-                    if y < 0 or x < 0 or y >= own.shape[0] or x >= own.shape[1]:
-                        inside = False
-                        continue
                     weight = weights_y[j] * weights_x[i]
                     share += weight * np.float32(changed[y, x])
-                    before += weight * own[y, x]
-                    after += weight * new[y, x]
-            if inside and share > 0.0:
-                code = np.float32(plane[cy0 + r, cx0 + c])
-                value = after + (np.float32(1.0) - share) * ((code - zero) / scale - before)
-                code = np.floor(value * scale + zero + np.float32(0.5))
-                plane[cy0 + r, cx0 + c] = plane.dtype.type(min(top_code, max(np.float32(0.0), code)))
+                    before += weight * own[y, x, channel]
+                    after += weight * new[y, x, channel]
+            if share > ZERO:
+                stored = (np.float32(plane[cy0 + r, cx0 + c]) - zero) / scale
+                value = after + (ONE - share) * (stored - before)
+                code = np.floor(value * scale + zero + HALF)
+                plane[cy0 + r, cx0 + c] = np.uint16(min(top_code, max(ZERO, code)))
+
+
+@njit(cache=True)
+def average_chroma(image, channel, columns, column_weights, rows, row_weights, plane, zero, scale, top_code):
+    """Averages one channel of a whole picture (h, w, 3) into a chroma plane of codes."""
+    line = np.empty(image.shape[1], np.float32)
+    for r in range(plane.shape[0]):
+        line[:] = ZERO
+        for j in range(row_weights.size):
+            values, weight = image[rows[r, j]], row_weights[j]
+            for x in range(line.size):
+                line[x] += weight * values[x, channel]
+        for c in range(plane.shape[1]):
+            total = ZERO
+            for i in range(column_weights.size):
+                total += column_weights[i] * line[columns[c, i]]
+            plane[r, c] = np.uint16(min(top_code, max(ZERO, np.floor(total * scale + zero + HALF))))

@@ -113,9 +113,7 @@ class VideoReader:
             )
         return picture
 
-    def _pictures(
-        self, container: "av.container.InputContainer", stream: "av.VideoStream"
-    ) -> Iterator[av.VideoFrame]:
+    def _pictures(self, container: "av.container.InputContainer", stream: "av.VideoStream") -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
         broken, decoded = 0, 0
         packets = container.demux(stream)
@@ -154,7 +152,8 @@ class VideoReader:
                 f"{self.path}: expected pictures of {self._layout} throughout, found {layout} at frame {index}; "
                 "cut the video where it changes"
             )
-        time = picture.pts * picture.time_base if picture.pts is not None else index / self.frame_rate
+        known = picture.pts is not None and picture.time_base is not None
+        time = picture.pts * picture.time_base if known else index / self.frame_rate
         planes, format_ = upright(planes_of(picture, self._format), self._format, picture.rotation)
         return Frame(index, float(time), planes, format_)
 
@@ -168,7 +167,7 @@ def planes_of(picture: av.VideoFrame, format_: PixelFormat) -> Planes:
     planes = []
     for k, (w, h) in zip(stored, sizes, strict=False):
         plane = planar.planes[k]
-        codes = np.frombuffer(plane, format_.dtype)
+        codes = np.frombuffer(memoryview(plane), format_.dtype)
         planes.append(codes.reshape(-1, plane.line_size // codes.itemsize)[:h, :w])
     return tuple(planes)
 

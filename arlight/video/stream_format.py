@@ -1,6 +1,7 @@
 """What a decoded picture's layout and colour tags mean."""
 
 import re
+from fractions import Fraction
 from typing import NamedTuple
 
 import av
@@ -111,7 +112,7 @@ def chroma_location(picture: av.VideoFrame) -> str | None:
     """
     graph = av.filter.Graph()
     source = graph.add_buffer(
-        width=picture.width, height=picture.height, format=picture.format, time_base=picture.time_base or "1/1000"
+        width=picture.width, height=picture.height, format=picture.format, time_base=Fraction(1, 1000)
     )
     report, sink = graph.add("showinfo", "checksum=0"), graph.add("buffersink")
     source.link_to(report)
