@@ -1,14 +1,32 @@
-"""The pose of the sheet from frame to frame."""
+"""The pose of the sheet from frame to frame: acquire, predict, align, and acquire again after a loss."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.camera import Camera
+from arlight.camera import Camera, Pose
+from arlight.color import linear_from_encoded
 from arlight.errors import CameraError
 from arlight.probe.design import Probe
+from arlight.tracking.alignment import SAMPLING_VARIANCE_PX2, Alignment, FiducialAlignment, Picture
 from arlight.tracking.fiducials import FiducialDetector
 from arlight.tracking.planar_pose import poses_from_detections
 from arlight.tracking.pose import ProbePose
+
+_TYPICAL_BLUR_PX = 0.8
+_BLUR_RATE = 0.2
+"""Share of a new frame in the running estimate of the blur."""
+_REMEMBERED_S = 1.0
+"""How long after a loss the last pose is still worth a try [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Sighting:
+    """A pose that was measured, and when."""
+
+    pose: Pose
+    time_s: float
 
 
 class PoseTracker:
@@ -17,15 +35,25 @@ class PoseTracker:
     Args:
         probe: the sheet.
         camera: intrinsics of the camera that filmed it.
+
+    Raises:
+        ProbeError: the sheet has no fiducials that ArUco knows.
     """
 
     def __init__(self, probe: Probe, camera: Camera) -> None:
         self._probe = probe
         self._camera = camera
         self._detector = FiducialDetector(probe)
+        self._alignment = FiducialAlignment(probe, camera)
+        self._srgb = linear_from_encoded(np.arange(256) / 255.0, "srgb")
+        self.reset()
 
     def reset(self) -> None:
         """Forget everything about earlier frames."""
+        self._last: _Sighting | None = None
+        self._before: _Sighting | None = None
+        self._blur_px: float | None = None
+        self._misses = 0
 
     def update(
         self, luma: NDArray[np.uint8], time_s: float, linear_table: NDArray[np.float32] | None = None
@@ -33,7 +61,7 @@ class PoseTracker:
         """The pose in the next frame.
 
         Args:
-            luma: (h, w) encoded luma as coded in the stream, of the camera's image size.
+            luma: (h, w) luma codes as in the stream, of the camera's image size.
             time_s: when the frame was taken [s].
             linear_table: (256,) linear light of each code; full-range sRGB by default.
 
@@ -43,15 +71,90 @@ class PoseTracker:
         Raises:
             CameraError: the frame's size is not the camera's.
         """
+        self._check_size(luma)
+        table = self._srgb if linear_table is None else np.ascontiguousarray(linear_table, np.float32)
+        found = self._follow(luma, time_s, table) or self._acquire(luma, table)
+        if found is None:
+            self._misses += 1
+            self._before = None
+            return ProbePose.lost()
+        self._misses = 0
+        self._before, self._last = self._last, _Sighting(found.pose, time_s)
+        if self._blur_px is None:
+            self._blur_px = found.blur_px
+        else:
+            self._blur_px += _BLUR_RATE * (found.blur_px - self._blur_px)
+        blur = float(np.sqrt(max(self._blur_px**2 - SAMPLING_VARIANCE_PX2, 0.0)))
+        return ProbePose(found.pose, found.residual_rms_px, "tracked", blur, int(np.count_nonzero(found.used)))
+
+    def _check_size(self, luma: NDArray[np.uint8]) -> None:
         width, height = self._camera.image_size
-        if luma.shape != (height, width):
+        if luma.ndim != 2 or luma.shape != (height, width):
+            found = "x".join(str(side) for side in luma.shape[::-1])
             raise CameraError(
-                f"the camera's image_size is {width}x{height}, the frame is {luma.shape[1]}x{luma.shape[0]}; "
+                f"the camera's image_size is {width}x{height}, the frame is {found}; "
                 "use the camera.json of this footage, or scale its intrinsics to the frame's size"
             )
-        for scale in (0.5, 1.0, 2.0):
-            hypotheses = poses_from_detections(self._camera, self._probe, self._detector.detect(luma, scale))
-            if hypotheses:
-                best = hypotheses[0]
-                return ProbePose(best.pose, best.rms_px, "tracked", markers_used=best.markers)
-        return ProbePose.lost()
+
+    def _follow(self, luma: NDArray[np.uint8], time_s: float, table: NDArray[np.float32]) -> Alignment | None:
+        """Align near the predicted pose, then with a wider reach, then near the last pose."""
+        if self._last is None or abs(time_s - self._last.time_s) > _REMEMBERED_S:
+            return None
+        attempts = [(self._last.pose, 4)]
+        if self._before is not None:
+            predicted = predict(self._before.pose, self._before.time_s, self._last.pose, self._last.time_s, time_s)
+            attempts = [(predicted, 2), (predicted, 4), *attempts]
+        for start, coarsest in attempts:
+            found = self._align(luma, table, start, coarsest)
+            if found is not None and found.accepted:
+                return found
+        return None
+
+    def _align(
+        self, luma: NDArray[np.uint8], table: NDArray[np.float32], start: Pose, coarsest: int
+    ) -> Alignment | None:
+        region = self._alignment.region(start)
+        if region is None:
+            return None
+        x0, y0, x1, y1 = region
+        picture = Picture(np.ascontiguousarray(luma[y0:y1, x0:x1]), table, (x0, y0))
+        if self._blur_px is not None:
+            return self._alignment.align(picture, start, self._blur_px, coarsest)
+        found = self._alignment.align(picture, start, _TYPICAL_BLUR_PX, coarsest)
+        for _ in range(3):
+            if found is None:
+                return None
+            found = self._alignment.align(picture, found.pose, found.blur_px, 1)
+        return found
+
+    def _acquire(self, luma: NDArray[np.uint8], table: NDArray[np.float32]) -> Alignment | None:
+        """Look for the sheet in the whole frame, and let alignment decide between the plane's two hypotheses."""
+        for scale in self._scales():
+            detections = self._detector.detect(luma, scale)
+            candidates = []
+            for hypothesis in poses_from_detections(self._camera, self._probe, detections):
+                found = self._align(luma, table, hypothesis.pose, 4)
+                if found is not None and found.accepted:
+                    candidates.append(found)
+            if candidates:
+                return max(candidates, key=lambda found: float(np.sum(found.correlation[found.used])))
+        return None
+
+    def _scales(self) -> tuple[float, ...]:
+        """Resolutions to search at: all at first and just after a loss, then one a frame, in turn."""
+        scales = (0.5, 1.0, 2.0) if min(self._camera.image_size) >= 480 else (1.0, 2.0, 0.5)
+        return scales if self._misses < 2 else (scales[self._misses % len(scales)],)
+
+
+def predict(before: Pose, before_s: float, last: Pose, last_s: float, time_s: float) -> Pose:
+    """The pose at a time if the sheet keeps turning and moving as between two sightings; no motion if time stood still.
+
+    Args:
+        before, last: poses at the times before_s and last_s [s].
+        time_s: when the next frame was taken [s]; more than three intervals ahead counts as three.
+    """
+    elapsed = last_s - before_s
+    share = min(max((time_s - last_s) / elapsed, 0.0), 3.0) if elapsed > 0.0 else 0.0
+    motion = Pose(last.rotation @ before.rotation.T, last.translation - before.translation)
+    turned = Pose.from_rvec(share * motion.rvec, np.zeros(3)).rotation
+    return Pose(turned @ last.rotation, last.translation + share * motion.translation)
