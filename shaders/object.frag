@@ -1,16 +1,14 @@
 #version 330
 // Matte body under a dielectric gloss. Radiance is absolute and linear; coverage goes to alpha.
-uniform vec3 eye_mm;
 uniform float roughness;
 uniform float normal_reflectance;
 uniform bool has_texture;
 uniform sampler2D gloss;              // octahedral map of lobe-averaged radiance
 uniform sampler2DArray base_texture;  // sRGB, decoded here
 
-in vec3 v_diffuse_radiance;
-in vec3 v_position_mm;
+in vec3 v_body;
+in vec3 v_view;
 in vec3 v_normal;
-in vec3 v_base_colour;
 in vec3 v_texture_place;
 in float v_openness;
 
@@ -37,13 +35,12 @@ vec3 linear_from_srgb(vec3 e) {
 }
 
 void main() {
-    vec3 view = normalize(eye_mm - v_position_mm);
-    vec3 normal = normalize(v_normal);
+    vec3 view = normalize(v_view);
+    vec3 normal = normalize(gl_FrontFacing ? v_normal : -v_normal);
     float cos_view = max(dot(normal, view), 0.02);
-    vec3 reflected = reflect(-view, normal);
-    vec3 body = v_base_colour;
+    vec3 body = v_body;
     if (has_texture) body *= linear_from_srgb(texture(base_texture, v_texture_place).rgb);
     float share = gloss_albedo(cos_view);
-    vec3 mirrored = max(texture(gloss, octahedral_place(reflected)).rgb, 0.0) * v_openness;
-    colour = vec4(body * v_diffuse_radiance * (1.0 - share) + share * mirrored, 1.0);
+    vec3 mirrored = max(texture(gloss, octahedral_place(reflect(-view, normal))).rgb, 0.0) * v_openness;
+    colour = vec4(body * (1.0 - share) + share * mirrored, 1.0);
 }

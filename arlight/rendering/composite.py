@@ -1,4 +1,4 @@
-"""Differential rendering in linear light: the plane darkens by the shadow's ratio, the object covers, nothing else changes."""
+"""Differential rendering in linear light: the plane darkens by a ratio, the object covers, nothing else changes."""
 
 import numpy as np
 from numba import njit
@@ -41,10 +41,17 @@ def shade_plane(
 
 def cover(linear: Image, x: int, y: int, drawn: Image) -> None:
     """Lay premultiplied radiance and coverage (h, w, 4) over linear light, in place, its top left pixel at (x, y)."""
-    height, width = drawn.shape[:2]
-    below = linear[y : y + height, x : x + width]
-    below *= 1.0 - drawn[..., 3:]
-    below += drawn[..., :3]
+    _cover(linear[y : y + drawn.shape[0], x : x + drawn.shape[1]], drawn)
+
+
+@njit(cache=True, nogil=True)
+def _cover(linear, drawn):  # type: ignore[no-untyped-def]
+    for y in range(linear.shape[0]):
+        for x in range(linear.shape[1]):
+            if drawn[y, x, 3] > 0.0:
+                left = np.float32(1.0) - drawn[y, x, 3]
+                for c in range(3):
+                    linear[y, x, c] = linear[y, x, c] * left + drawn[y, x, c]
 
 
 @njit(cache=True, nogil=True, fastmath=True)

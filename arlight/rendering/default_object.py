@@ -1,6 +1,6 @@
-"""An object of our own: a glossy knot wound over a disk, with a ball in it, made by formula.
+"""An object of our own: a varnished knot standing on a round pedestal beside a ball, made by formula.
 
-It shows what lighting does: a broad matte pedestal, one part's shadow on another, and a curved gloss in every direction.
+It shows what lighting does: one part's shadow on another, gloss in every direction, and contact with the sheet.
 """
 
 import numpy as np
@@ -10,39 +10,42 @@ from arlight.rendering.mesh import Mesh, joined, smooth_normals
 
 Array = NDArray[np.float64]
 
-_IVORY = (0.72, 0.66, 0.56)
-_TERRACOTTA = (0.62, 0.17, 0.07)
-_TEAL = (0.03, 0.30, 0.33)
+_STONE = (0.60, 0.58, 0.54)
+_TERRACOTTA = (0.55, 0.13, 0.05)
+_IVORY = (0.74, 0.64, 0.48)
+_TEAL = (0.02, 0.24, 0.27)
 
 
 def default_object() -> Mesh:
-    """The knot, its pedestal and the ball, in units of its own, z up; about 6500 vertices; always the same."""
+    """The knot, its pedestal and the ball, in units of its own, z up; about 5000 vertices; always the same."""
+    ball = _lathed(_ball_profile(radius=0.85), 40, _TEAL)
     return joined(
         [
-            _lathed(_pedestal_profile(), 72, _IVORY, 0.0),
-            _trefoil(along=216, around=20, tube=0.40, lift=1.62),
-            _lathed(_ball_profile(radius=0.62), 48, _TEAL, 0.45),
+            _lathed(_pedestal_profile(radius=2.0, height=0.7, edge=0.15), 60, _STONE),
+            _trefoil(along=144, around=16, tube=0.46, lift=2.88),
+            Mesh(ball.vertices_mm + [2.2, -2.5, 0.0], ball.normals, ball.faces, ball.base_colour, closed=True),
         ]
     )
 
 
-def _pedestal_profile() -> Array:
-    """(r, z) of a low disk with rounded edges, from the middle below to the middle above."""
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
-    edge = np.stack([3.0 + 0.2 * np.cos(turn), 0.22 + 0.2 * np.sin(turn)], axis=-1)
-    top = np.stack([np.linspace(2.9, 0.0, 26), np.full(26, 0.42)], axis=-1)
-    return np.concatenate([[[0.0, 0.02], [1.5, 0.02]], edge, top])
+def _pedestal_profile(radius: float, height: float, edge: float) -> Array:
+    """(r, z) of a disk with rounded edges, from the middle below to the middle above."""
+    turn = np.linspace(0.0, np.pi / 2, 5)
+    low = np.stack([radius - edge + edge * np.sin(turn), edge - edge * np.cos(turn)], axis=-1)
+    high = np.stack([radius - edge + edge * np.cos(turn), height - edge + edge * np.sin(turn)], axis=-1)
+    top = np.linspace(radius - 2 * edge, 0.0, 14)
+    return np.concatenate([[[0.0, 0.0]], low, high, np.stack([top, np.full_like(top, height)], axis=-1)])
 
 
 def _ball_profile(radius: float) -> Array:
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 25)
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 21)
     return np.stack([radius * np.cos(turn), radius * (1.0 + np.sin(turn))], axis=-1)
 
 
-def _lathed(profile: Array, around: int, colour: tuple[float, float, float], lift: float) -> Mesh:
+def _lathed(profile: Array, around: int, colour: tuple[float, float, float]) -> Mesh:
     """The surface that a profile (p, 2) of (radius, height) sweeps about the z axis."""
     azimuth = np.arange(around) * 2.0 * np.pi / around
-    radius, height = profile[:, :1], profile[:, 1:] + lift
+    radius, height = profile[:, :1], profile[:, 1:]
     grid = np.stack(
         [radius * np.cos(azimuth), radius * np.sin(azimuth), np.broadcast_to(height, (len(profile), around))], axis=-1
     )
@@ -50,13 +53,13 @@ def _lathed(profile: Array, around: int, colour: tuple[float, float, float], lif
 
 
 def _trefoil(along: int, around: int, tube: float, lift: float) -> Mesh:
-    """A trefoil knot's tube, its colour running from terracotta to ivory with its height."""
+    """A trefoil knot's tube, standing on two of its lobes, its colour running from terracotta to ivory."""
     t = np.arange(along) * 2.0 * np.pi / along
-    curve = np.stack([np.sin(t) + 2.0 * np.sin(2 * t), np.cos(t) - 2.0 * np.cos(2 * t), -np.sin(3 * t)], axis=-1)
-    curve *= [0.78, 0.78, 0.75]
+    curve = np.stack([-np.sin(t) - 2.0 * np.sin(2 * t), np.sin(3 * t) * 0.9, 2.0 * np.cos(2 * t) - np.cos(t)], axis=-1)
+    curve *= 0.86
     tangent = np.roll(curve, -1, axis=0) - np.roll(curve, 1, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    across = np.cross(tangent, [0.0, 0.0, 1.0])
+    across = np.cross(tangent, [0.0, 1.0, 0.0])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     upward = np.cross(across, tangent)
     s = np.arange(around) * 2.0 * np.pi / around
@@ -76,16 +79,12 @@ def _closed_grid(grid: Array, colour: Array, wraps_first: bool) -> Mesh:
     third, fourth = (row + 1) % a * b + (column + 1) % b, (row + 1) % a * b + column
     faces = np.concatenate([np.stack([first, second, third], -1), np.stack([first, third, fourth], -1)]).reshape(-1, 3)
     vertices = grid.reshape(-1, 3)
-    area = np.linalg.norm(
-        np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]), axis=1
-    )
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     faces = faces[area > 1e-9].astype(np.int32)
+    corners = vertices[faces]
+    # the sign of the enclosed volume tells whether the grid runs inside out
+    if np.sum(np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]) < 0:
+        faces = faces[:, ::-1].copy()
     normals = smooth_normals(vertices, faces)
-    if _signed_volume(vertices, faces) < 0:
-        faces, normals = faces[:, ::-1], -normals
-    return Mesh(vertices, normals, faces, colour.reshape(-1, 3).astype(np.float32))
-
-
-def _signed_volume(vertices: Array, faces: NDArray[np.int32]) -> float:
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return float(np.sum(np.cross(a, b) * c) / 6.0)
+    return Mesh(vertices, normals, faces, colour.reshape(-1, 3).astype(np.float32), closed=True)

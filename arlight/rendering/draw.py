@@ -1,7 +1,8 @@
-"""Draws the lit object's own box of the frame with OpenGL, anti-aliased, as linear premultiplied radiance and coverage."""
+"""Draws the lit object's own box of the frame, anti-aliased, as linear premultiplied radiance and coverage."""
 
 import threading
 
+import cv2
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +39,18 @@ class ObjectRenderer:
         """
         self._thread = threading.get_ident()
         self._samples = supersampling
+        self._closed = mesh.closed
         self._context = create_context()
+        # the viewport's rows run downward, which turns every triangle's winding round
+        self._context.front_face = "cw"
         self._program = self._context.program(
             vertex_shader=shader_source("object.vert"), fragment_shader=shader_source("object.frag")
         )
         self._set("roughness", roughness)
         self._set("normal_reflectance", normal_reflectance)
+        self._set("gloss", 0)
+        self._set("base_texture", 1)
+        self._set("has_texture", mesh.textures is not None)
         self._gloss = self._context.texture((GLOSS_SIDE, GLOSS_SIDE), 3, dtype="f4")
         self._gloss.repeat_x = self._gloss.repeat_y = False
         self._textures = self._upload_textures(mesh)
@@ -99,21 +106,18 @@ class ObjectRenderer:
         target = self._target_of(width, height)
         target.use()
         target.viewport = (0, 0, width, height)
-        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if self._closed else 0))
         target.clear(viewport=(0, 0, width, height))
         self._clip.write(np.ascontiguousarray(clip, np.float32))
         self._diffuse.write(np.ascontiguousarray(diffuse_radiance, np.float32))
         self._gloss.write(np.ascontiguousarray(gloss, np.float32))
         self._set("eye_mm", tuple(float(v) for v in eye_mm))
         self._gloss.use(0)
-        self._set("gloss", 0)
-        if self._textures is not None:
-            self._textures.use(1)
-            self._set("base_texture", 1)
+        self._textures.use(1)
         self._triangles.render()
         pixels = np.frombuffer(target.read((0, 0, width, height), 4, dtype="f4"), np.float32)
-        fine = pixels.reshape(size[1], self._samples, size[0], self._samples, 4)
-        return fine.mean(axis=(1, 3))
+        # over a whole number of samples this is their plain mean
+        return np.asarray(cv2.resize(pixels.reshape(height, width, 4), size, interpolation=cv2.INTER_AREA))
 
     def release(self) -> None:
         """Give the context back; the renderer cannot be used after."""
@@ -134,13 +138,12 @@ class ObjectRenderer:
             return self._target
         return held
 
-    def _upload_textures(self, mesh: Mesh) -> moderngl.TextureArray | None:
-        self._set("has_texture", mesh.textures is not None)
-        if mesh.textures is None:
-            return None
-        layers, height, width = mesh.textures.shape[:3]
+    def _upload_textures(self, mesh: Mesh) -> moderngl.TextureArray:
+        # two samplers of different kinds may not share a unit, so an object without textures gets a blank one
+        images = np.full((1, 1, 1, 3), 255, np.uint8) if mesh.textures is None else mesh.textures
+        layers, height, width = images.shape[:3]
         # row 0 of an OpenGL texture is v = 0, its bottom
-        data = np.ascontiguousarray(mesh.textures[:, ::-1])
+        data = np.ascontiguousarray(images[:, ::-1])
         textures = self._context.texture_array((width, height, layers), 3, data, alignment=1)
         textures.build_mipmaps()
         return textures

@@ -29,6 +29,8 @@ class Mesh:
     """(n,) which of `textures` a vertex uses; None without textures."""
     textures: NDArray[np.uint8] | None = None
     """(layers, h, w, 3) sRGB images, row 0 at the top; None without textures."""
+    closed: bool = False
+    """Whether its faces enclose a volume, so that those turned away from the camera cannot be seen."""
 
     def __post_init__(self) -> None:
         if len(self.faces) == 0 or len(self.vertices_mm) == 0:
@@ -85,6 +87,7 @@ def joined(parts: list[Mesh]) -> Mesh:
         np.concatenate([part.normals for part in parts]),
         np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=True)]).astype(np.int32),
         np.concatenate([part.base_colour for part in parts]),
+        closed=all(part.closed for part in parts),
     )
 
 

@@ -73,7 +73,9 @@ class Reconstruction:
     def irradiance_rows(self, normals: ArrayLike) -> Array:
         """Irradiance rows (d, m) of unoccluded surfaces with the unit normals (d, 3), sky and ground together."""
         n = np.asarray(normals, float)
-        sky = self.solid_angle_sr * (np.maximum(n @ self.directions.T, 0.0) @ self.rows)
+        # single precision: a large product of bounded, well-scaled numbers
+        cosine = np.maximum(n.astype(np.float32) @ self.directions.T.astype(np.float32), 0.0)
+        sky = self.solid_angle_sr * (cosine @ self.rows.astype(np.float32)).astype(float)
         # form factor of the lower hemisphere, in closed form
         ground = np.pi * (1.0 - n[:, 2:]) / 2.0
         return sky + ground * self.ground_radiance_row

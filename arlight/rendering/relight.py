@@ -14,13 +14,13 @@ from arlight.rendering.composite import cover, shade_plane
 from arlight.rendering.draw import ObjectRenderer
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.mesh import Mesh
-from arlight.rendering.projection import clip_coordinates, covered_region, union
+from arlight.rendering.projection import Projected, project, union
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.transfer import precompute_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
 
-_DARKENING = 0.002
+_DARKENING = 0.004
 """A shadow that takes less than this share of the light is below half an 8-bit level and is not drawn."""
 
 
@@ -119,21 +119,23 @@ class Relighter:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
         packed = self._packed(lighting)
         ratio = self.transfer.shadow.ratio(packed)
-        box = covered_region(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        seen = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        box = seen.region()
         region = union(box, self._shadow_region(camera_from_probe, ratio))
         if region is None:
             return frame
         linear = frame.linear_rgb(region)
         shade_plane(linear, region, self._camera, camera_from_probe, self.transfer.shadow.grid, ratio)
         if box is not None:
-            drawn = self._draw(camera_from_probe, packed, box)
+            drawn = self._draw(seen, box, camera_from_probe, packed)
             cover(linear, box.x0 - region.x0, box.y0 - region.y0, drawn)
         return frame.with_linear_rgb(region, linear)
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
-        box = covered_region(self._camera, camera_from_probe, self.mesh.vertices_mm)
-        return None if box is None else (box, self._draw(camera_from_probe, self._packed(lighting), box))
+        seen = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        box = seen.region()
+        return None if box is None else (box, self._draw(seen, box, camera_from_probe, self._packed(lighting)))
 
     def release(self) -> None:
         """Close the OpenGL context, from the thread that renders; it is opened again when needed."""
@@ -141,14 +143,16 @@ class Relighter:
             self._renderer.release()
             self._renderer = None
 
-    def _draw(self, camera_from_probe: Pose, packed: NDArray[np.float32], box: Region) -> NDArray[np.float32]:
+    def _draw(
+        self, seen: Projected, box: Region, camera_from_probe: Pose, packed: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         if self._renderer is None:
             s = self.settings
             self._renderer = ObjectRenderer(
                 self.mesh, self.transfer.openness, s.roughness, s.normal_reflectance, s.supersampling
             )
         return self._renderer.draw(
-            clip_coordinates(self._camera, camera_from_probe, self.mesh.vertices_mm, box),
+            seen.clip_coordinates(box),
             self.transfer.vertex_rows @ packed,
             self._gloss_rows @ packed,
             camera_from_probe.camera_centre_mm,
@@ -176,4 +180,4 @@ class Relighter:
         share = np.linspace(0.0, 1.0, 9)
         along_x, along_y = x[0] + share * (x[1] - x[0]), y[0] + share * (y[1] - y[0])
         outline = [(px, py, 0.0) for px in along_x for py in y] + [(px, py, 0.0) for py in along_y for px in x]
-        return covered_region(self._camera, camera_from_probe, np.array(outline), margin_px=1)
+        return project(self._camera, camera_from_probe, outline).region(margin_px=1)

@@ -1,4 +1,4 @@
-"""The shadow on the sheet: per texel of the plane z = 0, what the object takes from its irradiance, linear in the light."""
+"""The shadow on the sheet: what the object takes from the irradiance of the plane z = 0, linear in the light."""
 
 from dataclasses import dataclass
 
