@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from arlight.pipeline import Pipeline as Pipeline
     from arlight.probe.design import Probe as Probe
     from arlight.probe.storage import load_probe as load_probe
-    from arlight.rendering.relighter import Relighter as Relighter
+    from arlight.rendering.relight import Relighter as Relighter
     from arlight.results.log import read_log as read_log
     from arlight.video.frame import Frame as Frame
     from arlight.video.reader import VideoReader as VideoReader
@@ -35,7 +35,7 @@ _PUBLIC = {
     "Pipeline": "arlight.pipeline",
     "Pose": "arlight.camera",
     "Probe": "arlight.probe.design",
-    "Relighter": "arlight.rendering.relighter",
+    "Relighter": "arlight.rendering.relight",
     "VideoReader": "arlight.video.reader",
     "VideoWriter": "arlight.video.writer",
     "load_probe": "arlight.probe.storage",

@@ -1,0 +1,108 @@
+"""`arlight demo`: frames synthesised on the fly, tracked, relit and written, without any file to start from."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from arlight.commands.encoding import EncodingOptions
+from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
+from arlight.commands.loop import Sinks, run_frames
+from arlight.commands.options import File, OptionalFile
+from arlight.commands.outputs import Output, abandon, prepare_outputs
+from arlight.commands.relighting import RelightingOptions, make_relighter
+from arlight.commands.summary import print_summary
+from arlight.errors import ArlightError
+from arlight.pipeline import Pipeline
+from arlight.probe.design import Probe
+from arlight.probe.layout import design_probe
+from arlight.results.log import LightingLogWriter
+from arlight.results.record import LogHeader
+from arlight.results.statistics import RunStatistics
+from arlight.synthetic.light_script import ScriptName
+from arlight.synthetic.motion import PathName
+from arlight.synthetic.settings import SynthesisSettings
+from arlight.synthetic.synthesis import synthesize
+from arlight.video.frame import Frame
+from arlight.video.writer import VideoWriter
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """Show the whole loop without a camera: film a sheet that is not there, track it, light an object with its light.
+
+    Frames are synthesised one at a time, as a camera would give them.
+    """
+
+    output: File = Path("demo.mp4")
+    """The relit video."""
+    lighting: OptionalFile = None
+    """Pose and lighting, one JSON line a frame."""
+    seconds: float = 6.0
+    """Length of the video [s]."""
+    environment: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "hall"
+    """Captured light: the name of one that comes with arlight, or a latitude-longitude .hdr or .exr file."""
+    light: ScriptName = "turn"
+    """still, or turn: the light turns about the zenith."""
+    path: PathName = "orbit"
+    """How the camera moves."""
+    order: int = 5
+    """Order of the sheet, 1 to 8."""
+    relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
+    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
+
+
+def run(options: DemoOptions) -> int:
+    """Run the loop over synthetic frames; returns the exit status.
+
+    Raises:
+        ArlightError: something the user can mend, in the environment, the object or an output.
+    """
+    outputs = prepare_outputs(
+        {"--output": options.output, "--lighting": options.lighting}, [options.relighting.object, Path(options.environment)]
+    )
+    settings = SynthesisSettings(
+        environment=options.environment, light=options.light, path=options.path, duration_s=options.seconds
+    )
+    probe = design_probe(options.order)
+    relighter = make_relighter(options.relighting, probe, settings.filming_camera)
+    pipeline = Pipeline(probe, settings.filming_camera, relighter)
+    statistics = RunStatistics()
+    try:
+        interrupted = _process(options, settings, probe, pipeline, outputs, statistics)
+    except (ArlightError, KeyboardInterrupt):
+        abandon(outputs.values(), worth_keeping=statistics.tracked > 0)
+        raise
+    written = {option.removeprefix("--"): output.keep() for option, output in outputs.items()}
+    print_summary(statistics, written, interrupted)
+    return INTERRUPTED_EXIT_CODE if interrupted else 0
+
+
+def _process(
+    options: DemoOptions,
+    settings: SynthesisSettings,
+    probe: Probe,
+    pipeline: Pipeline,
+    outputs: dict[str, Output],
+    statistics: RunStatistics,
+) -> bool:
+    """Every frame into the outputs; returns whether it was interrupted."""
+    header = LogHeader.of(probe, settings.filming_camera, f"synthetic, {options.environment}", "designed on the fly")
+    with Sinks() as sinks:
+        sinks.video = VideoWriter(
+            outputs["--output"].growing,
+            settings.filming_camera.image_size,
+            settings.frame_rate,
+            crf=options.encoding.crf,
+            preset=options.encoding.preset,
+        )
+        if "--lighting" in outputs:
+            sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)
+        return run_frames(_frames(settings, probe), pipeline, sinks, statistics, "demo", settings.frame_count)
+
+
+def _frames(settings: SynthesisSettings, probe: Probe) -> Iterator[Frame]:
+    for synthetic in synthesize(settings, probe):
+        yield synthetic.frame

@@ -1,0 +1,106 @@
+"""`arlight run`: a recorded clip in, a relit clip and its lighting out."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tyro
+
+from arlight.commands.encoding import EncodingOptions
+from arlight.commands.footage import Footage, FootageOptions, check_result, open_footage
+from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
+from arlight.commands.loop import Sinks, run_frames
+from arlight.commands.options import OptionalFile, PositionalFile
+from arlight.commands.outputs import Output, abandon, prepare_outputs
+from arlight.commands.relighting import RelightingOptions, make_relighter
+from arlight.commands.summary import print_summary
+from arlight.errors import ArlightError, OutputError
+from arlight.pipeline import Pipeline
+from arlight.results.log import LightingLogWriter
+from arlight.results.record import LogHeader
+from arlight.results.report import ReportRecorder
+from arlight.results.statistics import RunStatistics
+from arlight.video.writer import VideoWriter
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Relight a recorded clip: track the sheet, estimate its light, draw an object under that light.
+
+    Ctrl-C ends the run after the frame in hand; all files are then complete up to it. An existing file is replaced only
+    when the run ends and the sheet was seen: until then the new one grows beside it as NAME.partial.EXT. A new file
+    grows under its own name. Either can be read up to the last frames even if the program is killed.
+    """
+
+    clip: PositionalFile
+    """The video of the sheet; probe.json and camera.json beside it are found by themselves."""
+    output: OptionalFile = None
+    """The relit video; CLIP-relit.mp4 in the current folder by default."""
+    lighting: OptionalFile = None
+    """Pose and lighting, one JSON line a frame as it is done; with --no-render CLIP.jsonl in the current folder by
+    default."""
+    report: OptionalFile = None
+    """An HTML page with the coefficients over time and the recovered light beside thumbnails."""
+    render: bool = True
+    """Draw the object and write the relit video; --no-render only estimates pose and lighting, without OpenGL."""
+    footage: tyro.conf.OmitArgPrefixes[FootageOptions] = field(default_factory=FootageOptions)
+    relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
+    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
+
+
+def run(options: RunOptions) -> int:
+    """Run the loop over a clip; returns the exit status.
+
+    Raises:
+        ArlightError: something the user can mend, in the clip, the probe, the camera, the object or an output.
+    """
+    with open_footage(options.clip, options.footage) as footage:
+        outputs = _prepare(options, footage)
+        pipeline = _pipeline(options, footage)
+        statistics = RunStatistics()
+        try:
+            interrupted = _process(options, footage, pipeline, outputs, statistics)
+            check_result(footage, statistics)
+        except (ArlightError, KeyboardInterrupt):
+            abandon(outputs.values(), worth_keeping=statistics.tracked > 0)
+            raise
+    written = {option.removeprefix("--"): output.keep() for option, output in outputs.items()}
+    print_summary(statistics, written, interrupted)
+    return INTERRUPTED_EXIT_CODE if interrupted else 0
+
+
+def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
+    """The outputs, checked before any work."""
+    output, lighting = options.output, options.lighting
+    if not options.render and output is not None:
+        raise OutputError(f"{output}: --no-render draws nothing that --output could hold; leave one of them out")
+    if options.render and output is None:
+        output = Path(f"{options.clip.stem}-relit.mp4")
+    if not options.render and lighting is None:
+        lighting = Path(f"{options.clip.stem}.jsonl")
+    inputs = [options.clip, footage.probe_path, footage.camera_path, options.relighting.object]
+    return prepare_outputs({"--output": output, "--lighting": lighting, "--report": options.report}, inputs)
+
+
+def _pipeline(options: RunOptions, footage: Footage) -> Pipeline:
+    relighter = make_relighter(options.relighting, footage.probe, footage.camera) if options.render else None
+    return Pipeline(footage.probe, footage.camera, relighter)
+
+
+def _process(
+    options: RunOptions, footage: Footage, pipeline: Pipeline, outputs: dict[str, Output], statistics: RunStatistics
+) -> bool:
+    """Every frame of the clip into the outputs; returns whether it was interrupted."""
+    header = LogHeader.of(footage.probe, footage.camera, str(options.clip), str(footage.probe_path))
+    with Sinks() as sinks:
+        if "--output" in outputs:
+            growing = outputs["--output"].growing
+            sinks.video = VideoWriter(growing, footage.reader, crf=options.encoding.crf, preset=options.encoding.preset)
+        if "--lighting" in outputs:
+            sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)
+        if "--report" in outputs:
+            sinks.report = ReportRecorder(header)
+        reader = footage.reader
+        interrupted = run_frames(reader, pipeline, sinks, statistics, options.clip.name, reader.frame_count)
+    if sinks.report is not None:
+        sinks.report.write(outputs["--report"].growing, statistics)
+    return interrupted

@@ -1,0 +1,30 @@
+"""The closing summary of a run."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from arlight.results.statistics import RunStatistics
+
+
+def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interrupted: bool) -> None:
+    """Print what a run amounts to and where its results are.
+
+    Args:
+        statistics: of the loop.
+        written: files by what they hold.
+        interrupted: whether Ctrl-C ended the run.
+    """
+    table = Table(show_header=False, box=None, pad_edge=False)
+    state = " (interrupted)" if interrupted else ""
+    table.add_row("frames", f"{statistics.frames}{state}")
+    counts = ", ".join(f"{count} {status}" for status, count in sorted(statistics.statuses.items(), reverse=True))
+    table.add_row("sheet", f"{100.0 * statistics.tracked_share:.1f} % tracked ({counts})")
+    table.add_row("speed", f"{statistics.frames_per_second:.1f} frames/s")
+    stages = ", ".join(f"{stage} {ms:.1f}" for stage, ms in statistics.median_ms.items())
+    table.add_row("ms per frame", f"{stages} (medians)")
+    for what, path in written.items():
+        table.add_row(what, str(path))
+    Console(soft_wrap=True, highlight=False).print(table)

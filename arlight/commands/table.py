@@ -1,0 +1,79 @@
+"""`arlight table`: the error per order over camera tilts and sheet widths."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from arlight.benchmark.accuracy import AccuracyCell, AccuracySettings, accuracy_table
+from arlight.probe.layout import design_probe
+from arlight.synthetic.settings import SynthesisSettings
+
+
+@dataclass(frozen=True)
+class TableOptions:
+    """Measure the error per order at several camera tilts and sheet widths, on synthesised footage.
+
+    Errors are relative to |L_0|, medians over the frames after the first ten; filtered, and in brackets of single
+    frames.
+    """
+
+    order: int = 5
+    """Order of the sheet, 1 to 8."""
+    environment: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "hall"
+    """Captured light: the name of one that comes with arlight, or a latitude-longitude .hdr or .exr file."""
+    tilts_deg: tuple[float, ...] = (15.0, 35.0, 55.0, 70.0)
+    """Camera's angles off the sheet's normal [deg]."""
+    widths_px: tuple[float, ...] = (300.0, 450.0, 700.0)
+    """Widths of the sheet in the picture [px]."""
+    frames: int = 16
+    """Frames of each clip."""
+
+
+def run(options: TableOptions) -> int:
+    """Print the table; returns the exit status.
+
+    Raises:
+        ArlightError: the environment or the sheet cannot be used, or there is no headless OpenGL.
+    """
+    settings = AccuracySettings(
+        tilts_deg=options.tilts_deg,
+        widths_px=options.widths_px,
+        frames=options.frames,
+        footage=SynthesisSettings(environment=options.environment, path="still"),
+    )
+    probe = design_probe(options.order)
+    console = Console(soft_wrap=True, highlight=False)
+    cells = []
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("clips", total=len(options.tilts_deg) * len(options.widths_px))
+        for cell in accuracy_table(settings, probe):
+            cells.append(cell)
+            progress.advance(task)
+    console.print(_table(cells, options))
+    return 0
+
+
+def _table(cells: list[AccuracyCell], options: TableOptions) -> Table:
+    table = Table(title=f"order {options.order} sheet, {options.environment}: error / |L_0| in %, filtered (one frame)")
+    for name in ("tilt", "width", "tracked", "pose px"):
+        table.add_column(name, justify="right")
+    for order in range(options.order + 1):
+        table.add_column(str(order), justify="right")
+    for cell in cells:
+        pose = cell.filtered.pose
+        errors = [
+            f"{100.0 * filtered.relative_to_l0:.2f} ({100.0 * single.relative_to_l0:.2f})"
+            for filtered, single in zip(cell.filtered.orders, cell.single_frame.orders, strict=True)
+        ]
+        table.add_row(
+            f"{cell.tilt_deg:g}",
+            f"{cell.width_px:g}",
+            f"{100.0 * cell.filtered.tracked_share:.0f} %",
+            "-" if pose is None else f"{pose.rms_px:.3f}",
+            *errors,
+        )
+    return table

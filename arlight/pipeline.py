@@ -1,0 +1,73 @@
+"""The frame loop: a frame comes in, becomes a pose, becomes lighting, becomes an image."""
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol
+
+from arlight.camera import Camera, Pose
+from arlight.estimation.lighting import Lighting
+from arlight.lighting_tracker import FrameEstimate, LightingTracker
+from arlight.probe.design import Probe
+from arlight.tracking.pose import ProbePose
+from arlight.video.frame import Frame
+
+
+class FrameRelighter(Protocol):
+    """What draws a lit object into a frame, such as `arlight.Relighter`."""
+
+    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
+        """The frame with the lit object in it; the frame itself where pose or light is not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameResult:
+    """What the loop made of one frame."""
+
+    composite: Frame
+    """The frame with the lit object in it; the frame itself while nothing can be drawn."""
+    estimate: FrameEstimate
+    """Pose and lighting of the frame."""
+    timings_s: dict[str, float]
+    """Seconds per stage, the estimate's stages and `render`."""
+
+    @property
+    def pose(self) -> ProbePose:
+        """Where the sheet is."""
+        return self.estimate.pose
+
+    @property
+    def lighting(self) -> Lighting | None:
+        """The filtered lighting; None before the first estimate."""
+        return self.estimate.lighting
+
+
+class Pipeline:
+    """Frames in, lit composites out; the same as `LightingTracker` with relighting and compositing."""
+
+    def __init__(self, probe: Probe, camera: Camera, relighter: FrameRelighter | None = None) -> None:
+        """Prepare the loop.
+
+        Args:
+            probe: the sheet in the footage.
+            camera: the camera that filmed it.
+            relighter: draws the object; None leaves the frames as they are (lighting only).
+        """
+        self._tracker = LightingTracker(probe, camera)
+        self._relighter = relighter
+
+    def process(self, frame: Frame) -> FrameResult:
+        """Track the sheet, estimate its light, draw the object under that light.
+
+        Frames are to come in order; a frame without the sheet in view is answered with the status `coasting` or
+        `lost`, never with an exception.
+        """
+        estimate = self._tracker.update(frame)
+        started = perf_counter()
+        composite = frame
+        if self._relighter is not None:
+            composite = self._relighter.render(frame, estimate.pose.camera_from_probe, estimate.lighting)
+        return FrameResult(composite, estimate, estimate.timings_s | {"render": perf_counter() - started})
+
+    def reset(self) -> None:
+        """Forget pose and light, as before the first frame."""
+        self._tracker.reset()
