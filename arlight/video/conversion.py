@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from arlight.color import Transfer, encoded_from_linear, linear_from_encoded
 from arlight.video import kernels
 from arlight.video.chroma_grid import AxisGrid, axis_grid
-from arlight.video.pixel_format import HD_LINES, LUMA_WEIGHTS, PixelFormat, chroma_offset_px
+from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
 
 Upsampling = Literal["guided", "bilinear"]
 """How chroma stored at a lower resolution is brought to every pixel, at its exact position.
 
-`bilinear` interpolates it. `guided` multiplies that by Y' / (Y' averaged as chroma was, then interpolated as chroma is):
-exact where the ratios of the channels are locally constant, as on grey stripes under coloured light.
+`bilinear` interpolates it. `guided` multiplies that by Y' / (Y' averaged as chroma was, then interpolated as chroma
+is): exact where the ratios of the channels are locally constant, as on grey stripes under coloured light.
 """
 Plane = NDArray[np.uint8] | NDArray[np.uint16]
 Planes = tuple[Plane, ...]
@@ -70,9 +70,9 @@ def full_range_luma(planes: Planes, format_: PixelFormat) -> NDArray[np.uint8]:
     if format_.matrix == "rgb":
         red, blue = LUMA_WEIGHTS["bt709"]
         weights = (np.float32(red), np.float32(1.0 - red - blue), np.float32(blue))
-        return kernels.weighted_bytes(*planes, weights, *_luma_scale(format_))
+        return kernels.weighted_bytes(*planes, weights, *_luma_scale(format_))  # type: ignore[call-arg]
     if format_.full_range and planes[0].dtype == np.uint8:
-        return planes[0]
+        return planes[0].view(np.uint8)
     return kernels.to_bytes(planes[0], *_luma_scale(format_))
 
 
@@ -81,9 +81,7 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
     if format_.matrix != "gray":
         return planes, format_
     h, w = planes[0].shape
-    matrix: Literal["bt709", "bt601"] = "bt709" if min(w, h) >= HD_LINES else "bt601"
-    offset = chroma_offset_px("left", (1, 1))
-    colour = PixelFormat(matrix, format_.full_range, format_.bit_depth, (1, 1), offset, format_.transfer)
+    colour = colour_format(format_, (w, h))
     neutral = np.full(colour.chroma_size((w, h))[::-1], colour.chroma_code_range[0], colour.dtype)
     return (planes[0], neutral, neutral), colour
 
@@ -153,7 +151,7 @@ def _full_resolution(planes: Planes, format_: PixelFormat, box: Box, chroma: Ups
     """Y', Cb, Cr (or R', G', B') at every pixel of a region (h, w, 3), not clamped."""
     black, scale = _luma_scale(format_)
     if format_.matrix == "rgb":
-        return kernels.stack(*planes, *box, black, scale)
+        return kernels.stack(*planes, *box, black, scale)  # type: ignore[call-arg]
     columns, rows = _grids(planes[0].shape, format_, box)
     guided = chroma == "guided" and format_.chroma_shift != (0, 0)
     luma_low = np.zeros((1, 1), np.float32)

@@ -1,7 +1,7 @@
 """The inner loops of colour conversion, compiled. Planes hold codes; Y', Cb, Cr and R'G'B' are float32.
 
-Tables are curves over [0, 1], evenly spaced, with their last entry repeated so that the entry after 1 exists. Indices are
-unsigned: the compiler then leaves out Python's wrap-around.
+Tables are curves over [0, 1], evenly spaced, with their last entry repeated so that the entry after 1 exists. Indices
+are unsigned: the compiler then leaves out Python's wrap-around.
 """
 
 import numpy as np
@@ -154,7 +154,7 @@ def weighted_bytes(first, second, third, weights, black, scale):
 
 @njit(cache=True)
 def replace_pixels(ycc, left, top, linear, to_rgb_matrix, to_ycc_matrix, decode, encode):
-    """Puts new linear light (h, w, 3) at (left, top) of Y'CbCr (h, w, 3), in place, where it differs from what is there.
+    """Puts new linear light (h, w, 3) at (left, top) of Y'CbCr (h, w, 3), in place, where it differs from the old.
 
     Args:
         decode: table from encoded values to linear light.
@@ -166,20 +166,22 @@ def replace_pixels(ycc, left, top, linear, to_rgb_matrix, to_ycc_matrix, decode,
     changed = np.zeros(ycc.shape[:2], np.uint8)
     for y in range(linear.shape[0]):
         for x in range(linear.shape[1]):
-            pixel, new = ycc[top + y, left + x], linear[y, x]
-            a, b, c = pixel[0], pixel[1], pixel[2]
-            differs = False
-            for k in range(3):
-                own = interpolate(decode, row_product(to_rgb_matrix, k, a, b, c))
-                # written so that a value that is not a number counts as no change
-                differs = differs or abs(new[k] - own) > UNCHANGED
-            if differs:
-                changed[top + y, left + x] = 1
-                r = interpolate(encode, np.sqrt(max(new[0], ZERO)))
-                g = interpolate(encode, np.sqrt(max(new[1], ZERO)))
-                b = interpolate(encode, np.sqrt(max(new[2], ZERO)))
-                for k in range(3):
-                    pixel[k] = row_product(to_ycc_matrix, k, r, g, b)
+            i, j = top + y, left + x
+            a, b, c = ycc[i, j, 0], ycc[i, j, 1], ycc[i, j, 2]
+            red, green, blue = linear[y, x, 0], linear[y, x, 1], linear[y, x, 2]
+            difference = max(
+                abs(red - interpolate(decode, row_product(to_rgb_matrix, 0, a, b, c))),
+                abs(green - interpolate(decode, row_product(to_rgb_matrix, 1, a, b, c))),
+                abs(blue - interpolate(decode, row_product(to_rgb_matrix, 2, a, b, c))),
+            )
+            if difference > UNCHANGED:
+                changed[i, j] = 1
+                red = interpolate(encode, np.sqrt(max(red, ZERO)))
+                green = interpolate(encode, np.sqrt(max(green, ZERO)))
+                blue = interpolate(encode, np.sqrt(max(blue, ZERO)))
+                ycc[i, j, 0] = row_product(to_ycc_matrix, 0, red, green, blue)
+                ycc[i, j, 1] = row_product(to_ycc_matrix, 1, red, green, blue)
+                ycc[i, j, 2] = row_product(to_ycc_matrix, 2, red, green, blue)
     return changed
 
 
@@ -202,23 +204,30 @@ def write_chroma(plane, own, new, channel, changed, x0, y0, columns, rows, zero,
     """
     cx0, taps_x, weights_x = columns[1], columns[6], columns[7]
     cy0, taps_y, weights_y = rows[1], rows[6], rows[7]
+    width = own.shape[1]
+    share, before, after = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     for r in range(taps_y.shape[0]):
         if taps_y[r, 0] < y0 or taps_y[r, -1] >= y0 + own.shape[0]:
             continue
+        share[:], before[:], after[:] = ZERO, ZERO, ZERO
+        for j in range(weights_y.size):
+            y, weight = taps_y[r, j] - y0, weights_y[j]
+            for x in range(width):
+                share[x] += weight * np.float32(changed[y, x])
+                before[x] += weight * own[y, x, channel]
+                after[x] += weight * new[y, x, channel]
         for c in range(taps_x.shape[0]):
-            if taps_x[c, 0] < x0 or taps_x[c, -1] >= x0 + own.shape[1]:
+            if taps_x[c, 0] < x0 or taps_x[c, -1] >= x0 + width:
                 continue
-            share, before, after = ZERO, ZERO, ZERO
-            for j in range(weights_y.size):
-                for i in range(weights_x.size):
-                    y, x = taps_y[r, j] - y0, taps_x[c, i] - x0
-                    weight = weights_y[j] * weights_x[i]
-                    share += weight * np.float32(changed[y, x])
-                    before += weight * own[y, x, channel]
-                    after += weight * new[y, x, channel]
-            if share > ZERO:
+            part, old, value = ZERO, ZERO, ZERO
+            for i in range(weights_x.size):
+                x, weight = taps_x[c, i] - x0, weights_x[i]
+                part += weight * share[x]
+                old += weight * before[x]
+                value += weight * after[x]
+            if part > ZERO:
                 stored = (np.float32(plane[cy0 + r, cx0 + c]) - zero) / scale
-                value = after + (ONE - share) * (stored - before)
+                value += (ONE - part) * (stored - old)
                 code = np.floor(value * scale + zero + HALF)
                 plane[cy0 + r, cx0 + c] = np.uint16(min(top_code, max(ZERO, code)))
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from arlight.video.frame import Planes
+from arlight.video.conversion import Planes
 from arlight.video.pixel_format import PixelFormat
 
 

@@ -1,6 +1,6 @@
 """How a frame's planes stand for colour: matrix, range, depth, chroma grid, transfer."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -27,7 +27,7 @@ CHROMA_LOCATIONS: dict[str, tuple[float, float]] = {
     "bottomleft": (0.0, 1.0),
     "bottom": (0.5, 1.0),
 }
-"""Where chroma lies between the first (0) and the last (1) luma column and row that share it (ITU-T H.273, figure 6)."""
+"""Where chroma lies between the first (0) and last (1) luma column and row that share it (ITU-T H.273, figure 6)."""
 
 HD_LINES = 720
 """Untagged pictures with this many lines are BT.709, smaller ones BT.601."""
@@ -108,3 +108,17 @@ class PixelFormat:
     def ycc_from_rgb(self) -> NDArray[np.float32]:
         """Inverse of `rgb_from_ycc`."""
         return np.linalg.inv(self.rgb_from_ycc().astype(np.float64)).astype(np.float32)
+
+
+def colour_format(format_: PixelFormat, size: tuple[int, int]) -> PixelFormat:
+    """The Y'CbCr format nearest to a format, for a picture of `size` (w, h) [px].
+
+    Grey keeps its range and gets 4:2:0 chroma, R'G'B' becomes limited-range 4:4:4, Y'CbCr stays as it is.
+    """
+    matrix: Matrix = "bt709" if min(size) >= HD_LINES else "bt601"
+    if format_.matrix == "gray":
+        offset = chroma_offset_px("left", (1, 1))
+        return replace(format_, matrix=matrix, chroma_shift=(1, 1), chroma_offset_px=offset)
+    if format_.matrix == "rgb":
+        return replace(format_, matrix=matrix, full_range=False)
+    return format_

@@ -11,7 +11,8 @@ import av.error
 import numpy as np
 
 from arlight.errors import VideoError
-from arlight.video.frame import Frame, Planes
+from arlight.video.conversion import Plane, Planes
+from arlight.video.frame import Frame
 from arlight.video.orientation import upright
 from arlight.video.pixel_format import PixelFormat
 from arlight.video.stream_format import ColourTags, chroma_location, colour_tags, pixel_format, planar_name
@@ -23,8 +24,9 @@ FALLBACK_RATE = Fraction(25)
 class VideoReader:
     """A video file as an iterable of frames, upright, in order of presentation; may be iterated once at a time.
 
-    The first frame is decoded when the reader is opened, so what cannot be read is refused there. A file that is damaged
-    further on yields the frames that are intact and says in `damage` what is missing. Interlaced video is refused.
+    The first frame is decoded when the reader is opened, so what cannot be read is refused there. A file that is
+    damaged further on yields the frames that are intact and says in `damage` what is missing. Interlaced video is
+    refused.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -152,8 +154,7 @@ class VideoReader:
                 f"{self.path}: expected pictures of {self._layout} throughout, found {layout} at frame {index}; "
                 "cut the video where it changes"
             )
-        known = picture.pts is not None and picture.time_base is not None
-        time = picture.pts * picture.time_base if known else index / self.frame_rate
+        time = index / self.frame_rate if picture.pts is None else picture.pts * (picture.time_base or self.time_base)
         planes, format_ = upright(planes_of(picture, self._format), self._format, picture.rotation)
         return Frame(index, float(time), planes, format_)
 
@@ -164,10 +165,10 @@ def planes_of(picture: av.VideoFrame, format_: PixelFormat) -> Planes:
     size = (planar.width, planar.height)
     sizes = [size, format_.chroma_size(size), format_.chroma_size(size)][: format_.plane_count]
     stored = (2, 0, 1) if format_.matrix == "rgb" else (0, 1, 2)
-    planes = []
+    planes: list[Plane] = []
     for k, (w, h) in zip(stored, sizes, strict=False):
         plane = planar.planes[k]
-        codes = np.frombuffer(memoryview(plane), format_.dtype)
+        codes: Plane = np.frombuffer(memoryview(plane), format_.dtype)
         planes.append(codes.reshape(-1, plane.line_size // codes.itemsize)[:h, :w])
     return tuple(planes)
 

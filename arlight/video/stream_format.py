@@ -24,8 +24,12 @@ TRANSFERS: dict[int, Transfer] = {
     1: "bt709", 2: "srgb", 4: "gamma22", 5: "gamma28", 6: "bt709", 7: "bt709", 8: "linear", 11: "bt709", 12: "bt709",
     13: "srgb", 14: "bt709", 15: "bt709", 18: "hlg",
 }  # fmt: skip
-"""Transfer by its number in ITU-T H.273. Tagged camera curves are inverted as such, because the light of the scene is wanted,
-not that of a display; untagged pictures (2, or the reserved 0 and 3) are read as sRGB."""
+"""Transfer by its number in ITU-T H.273. Tagged camera curves are inverted as such, because the light of the scene is
+wanted, not that of a display; untagged pictures (2, or the reserved 0 and 3) are read as sRGB."""
+TRANSFER_NUMBERS: dict[Transfer, int] = {
+    "bt709": 1, "gamma22": 4, "gamma28": 5, "linear": 8, "srgb": 13, "hlg": 18,
+}  # fmt: skip
+"""What a transfer is tagged as."""
 UNSPECIFIED = 2
 FULL_RANGE = 2
 GREY_IS_LIMITED = frozenset({"h264", "hevc", "av1", "vp8", "vp9", "mpeg1video", "mpeg2video", "mpeg4", "libdav1d"})
@@ -50,6 +54,17 @@ def colour_tags(picture: av.VideoFrame) -> ColourTags:
     return ColourTags(
         int(picture.colorspace), int(picture.color_range), int(picture.color_trc), int(picture.color_primaries)
     )
+
+
+def tags_of(format_: PixelFormat, source: ColourTags | None) -> ColourTags:
+    """The tags to encode a Y'CbCr picture with: those of its source where they say the same, else the format's own."""
+    matrix = next(number for number, name in MATRICES.items() if name == format_.matrix)
+    if source and MATRICES.get(source.matrix) == format_.matrix:
+        matrix = source.matrix
+    transfer = TRANSFER_NUMBERS[format_.transfer]
+    if source and TRANSFERS.get(source.transfer) == format_.transfer:
+        transfer = source.transfer
+    return ColourTags(matrix, FULL_RANGE if format_.full_range else 1, transfer, source.primaries if source else 1)
 
 
 def planar_name(name: str) -> str:
@@ -134,9 +149,10 @@ def _matrix(tags: ColourTags, size: tuple[int, int]) -> Matrix:
     if tags.matrix in (0, UNSPECIFIED, 3):
         return "bt709" if min(size) >= HD_LINES else "bt601"
     if tags.matrix not in MATRICES:
+        known = ", ".join(sorted(set(MATRICES.values())))
         raise VideoError(
-            f"its colour matrix (number {tags.matrix} of ITU-T H.273) is not understood; expected one of "
-            f"{', '.join(sorted(set(MATRICES.values())))}: convert it, for instance with ffmpeg -vf scale=out_color_matrix=bt709"
+            f"its colour matrix (number {tags.matrix} of ITU-T H.273) is not understood; expected one of {known}: "
+            "convert it, for instance with ffmpeg -vf scale=out_color_matrix=bt709"
         )
     return MATRICES[tags.matrix]
 
@@ -146,7 +162,7 @@ def _transfer(tags: ColourTags) -> Transfer:
         return "srgb"
     if tags.transfer not in TRANSFERS:
         raise VideoError(
-            f"its transfer curve (number {tags.transfer} of ITU-T H.273) is not understood; expected sRGB, BT.709, HLG, "
-            "a gamma or linear light: record or convert without PQ or a log profile"
+            f"its transfer curve (number {tags.transfer} of ITU-T H.273) is not understood; expected sRGB, BT.709, "
+            "HLG, a gamma or linear light: record or convert without PQ or a log profile"
         )
     return TRANSFERS[tags.transfer]

@@ -1,0 +1,207 @@
+"""Writes frames as H.264 with their own times and colour tags; what is written is on disk at once."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+
+import av
+import av.error
+import numpy as np
+from av.container import OutputContainer
+from av.video.stream import VideoStream
+
+from arlight.errors import OutputError
+from arlight.video.audio import AudioCopy
+from arlight.video.conversion import Planes
+from arlight.video.frame import Frame
+from arlight.video.pixel_format import CHROMA_LOCATIONS, PixelFormat, chroma_offset_px, colour_format
+from arlight.video.reader import VideoReader
+from arlight.video.stream_format import tags_of
+
+CONTAINERS = (".mp4", ".m4v", ".mov", ".mkv")
+"""Endings of the containers that keep H.264 with its own times."""
+CONTAINER_OPTIONS: dict[str, dict[str, str]] = {
+    # a fragment a frame until the file is closed, a plain file after; the header waits for the first time stamp
+    "mov": {"movflags": "+hybrid_fragmented+frag_every_frame+delay_moov"},
+    # a cluster a frame
+    "matroska": {"cluster_time_limit": "1"},
+}
+DEFAULT_TIME_BASE = Fraction(1, 90_000)
+"""Unit of time of frames that come from no file [s]."""
+
+
+class VideoWriter:
+    """A sink for frames. Nothing is opened, and nothing that was there is replaced, before the first frame.
+
+    The file is readable up to the last frame but one even if the process is killed, and complete when the writer is
+    closed, also by Ctrl-C: the encoder runs without delay and every frame is flushed. 4:2:0, 8 bits, or 10 where the
+    frames have more; matrix, range, transfer and chroma sites stay the frames' own. An odd width or height, which
+    4:2:0 has no room for, is padded to the next even one by repeating the edge. The source's sound is copied as it is.
+    """
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        like: VideoReader | None = None,
+        *,
+        frame_rate: Fraction | int | None = None,
+        crf: int = 18,
+        preset: str = "ultrafast",
+        audio: bool = True,
+    ) -> None:
+        """Checks that the output could be written.
+
+        Args:
+            path: the output; ends in one of `CONTAINERS`.
+            like: the source, whose unit of time, colour tags and sound are kept.
+            frame_rate: nominal frames per second, the source's or 30 by default; frames keep their own times.
+            crf: quality of libx264, 0 to 51, lower is better.
+            preset: speed of libx264, `ultrafast` to `veryslow`.
+            audio: copy the source's sound.
+
+        Raises:
+            OutputError: the output is the source, is a folder, or its folder is missing or not writable.
+        """
+        self.path = Path(path)
+        """The output."""
+        self._like, self._audio_wanted = like, audio
+        self._rate = Fraction(frame_rate or (like.frame_rate if like else 30))
+        self._time_base = like.time_base if like else DEFAULT_TIME_BASE
+        self._options = {"preset": preset, "crf": str(crf), "tune": "zerolatency"}
+        self._container: OutputContainer | None = None
+        self._audio: AudioCopy | None = None
+        self._last_time = -(2**62)
+        check_output(self.path, [like.path] if like else [])
+
+    def write(self, frame: Frame) -> None:
+        """Appends a frame.
+
+        Raises:
+            OutputError: the file cannot be written.
+            ValueError: the frame's size or format differs from the first one's.
+        """
+        try:
+            if self._container is None:
+                self._open(frame)
+            self._write(frame)
+        except (av.error.FFmpegError, OSError) as error:
+            raise OutputError(
+                f"{self.path}: cannot be written ({error.strerror}); check the folder, the space on the disk and "
+                "whether another program has the file open"
+            ) from error
+
+    def close(self) -> None:
+        """Completes the file; without a frame there is none."""
+        container, self._container = self._container, None
+        if container is None:
+            return
+        try:
+            container.mux(self._stream.encode(None))
+            container.close()
+        except (av.error.FFmpegError, OSError) as error:
+            raise OutputError(
+                f"{self.path}: cannot be completed ({error.strerror}); check the space on the disk"
+            ) from error
+        finally:
+            if self._audio:
+                self._audio.close()
+
+    def __enter__(self) -> "VideoWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _open(self, frame: Frame) -> None:
+        kind = "matroska" if self.path.suffix.lower() == ".mkv" else "mov"
+        # interleaving waits for the stream that is behind, at most this long: sound may end before the picture
+        options = {"flush_packets": "1", "max_interleave_delta": "100000", **CONTAINER_OPTIONS[kind]}
+        muxer = "matroska" if kind == "matroska" else "mov" if self.path.suffix.lower() == ".mov" else "mp4"
+        container = av.open(str(self.path), "w", format=muxer, container_options=options)
+        try:
+            self._source_format, self._format = frame.format, encoded_format(frame)
+            self._stream = self._video_stream(container, frame)
+            wanted = self._like if self._audio_wanted else None
+            self._audio = AudioCopy(wanted.path, container, self.path) if wanted else None
+        except BaseException:
+            container.close()
+            raise
+        self._container = container
+
+    def _video_stream(self, container: OutputContainer, frame: Frame) -> VideoStream:
+        w, h = self._size = frame.size
+        stream = container.add_stream("libx264", rate=self._rate)
+        stream.width, stream.height = w + w % 2, h + h % 2
+        stream.pix_fmt = "yuv420p" if self._format.bit_depth == 8 else "yuv420p10le"
+        context = stream.codec_context
+        context.time_base = stream.time_base = self._time_base
+        tags = tags_of(self._format, self._like.tags if self._like else None)
+        context.colorspace, context.color_range, context.color_trc, context.color_primaries = tags
+        if self._like and self._like.pixel_aspect:
+            context.sample_aspect_ratio = self._like.pixel_aspect
+        stream.options = {**self._options, "chroma_sample_location": _location(self._format)}
+        return stream
+
+    def _write(self, frame: Frame) -> None:
+        if frame.size != self._size:
+            raise ValueError(f"expected frames of {self._size} pixels like the first one, found {frame.size}")
+        planes = frame.converted(self._format).planes
+        picture = _picture(planes, self._stream)
+        # two frames may not share a time: the container would refuse the second
+        ticks = max(round(Fraction(frame.time_s) / self._time_base), self._last_time + 1)
+        picture.pts, picture.time_base, self._last_time = ticks, self._time_base, ticks
+        packets = self._stream.encode(picture)
+        assert self._container is not None
+        if self._audio:
+            self._audio.write_until(float(frame.time_s + 1 / self._rate))
+        self._container.mux(packets)
+
+
+def encoded_format(frame: Frame) -> PixelFormat:
+    """The 4:2:0 format that a frame is encoded in: matrix, range, transfer and, if it is 4:2:0, chroma sites are its own."""
+    colour = colour_format(frame.format, frame.size)
+    offset = colour.chroma_offset_px
+    if colour.chroma_shift != (1, 1) or offset not in CHROMA_LOCATIONS.values():
+        offset = chroma_offset_px("left", (1, 1))
+    return replace(colour, bit_depth=8 if colour.bit_depth == 8 else 10, chroma_shift=(1, 1), chroma_offset_px=offset)
+
+
+def check_output(path: Path, inputs: Sequence[Path]) -> None:
+    """Refuses an output that cannot be written or that is one of the inputs.
+
+    Raises:
+        OutputError: which it is, and what to do.
+    """
+    if path.suffix.lower() not in CONTAINERS:
+        raise OutputError(f"{path}: expected a name that ends in {', '.join(CONTAINERS)}; rename the output")
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, expected the name of a file in it")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: its folder {path.parent} does not exist; create it first")
+    for source in inputs:
+        if path.exists() and source.exists() and path.samefile(source):
+            raise OutputError(f"{path}: is also the input; name another output")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise OutputError(f"{path}: may not be written; change its permissions or name another output")
+
+
+def _location(format_: PixelFormat) -> str:
+    return next(name for name, place in CHROMA_LOCATIONS.items() if place == format_.chroma_offset_px)
+
+
+def _picture(planes: Planes, stream: VideoStream) -> av.VideoFrame:
+    """Planes as a picture for the encoder, padded to its size by repeating the edge."""
+    picture = av.VideoFrame(stream.width, stream.height, stream.codec_context.pix_fmt or "yuv420p")
+    for target, codes in zip(picture.planes, planes, strict=True):
+        memory = np.frombuffer(memoryview(target), codes.dtype).reshape(-1, target.line_size // codes.itemsize)
+        h, w = codes.shape
+        memory[:h, :w] = codes
+        memory[:h, w : target.width] = codes[:, -1:]
+        memory[h : target.height, : target.width] = memory[h - 1, : target.width]
+    return picture
