@@ -40,7 +40,7 @@ class ProbeGlass(Protocol):
 class RelightSettings:
     """How the object stands on the sheet and how it is lit."""
 
-    size_mm: float = 60.0
+    size_mm: float = 50.0
     """Largest side of the object's bounding box [mm]."""
     position_mm: tuple[float, float] = (0.0, 0.0)
     """Where the middle of the object stands, probe frame [mm]."""

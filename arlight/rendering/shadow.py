@@ -11,10 +11,10 @@ from arlight.rendering.reconstruction import Reconstruction
 Array = NDArray[np.float64]
 Rows = NDArray[np.float32]
 
-_REACH_HEIGHTS = 1.7
-"""How far the map reaches beyond the object, in heights of the object: light higher than 30 degrees stays inside."""
-_FADE = 0.12
-"""Share of the map's half side over which a shadow longer than the map is faded out."""
+_REACH_HEIGHTS = 1.0
+"""How far the map reaches beyond the object, in heights of the object: light above 45 degrees stays inside."""
+_FADE = 0.35
+"""Share of the map's half side over which a shadow longer than the map is faded out; there it takes a few per cent."""
 
 
 @dataclass(frozen=True, slots=True)
