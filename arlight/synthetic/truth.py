@@ -108,12 +108,14 @@ def _rounded(values: NDArray[np.float64]) -> list[list[float]]:
 
 
 def _frame_from(entry: dict[str, Any], count: int) -> FrameTruth:
-    coefficients = np.array(entry["coefficients_re"], float) + 1j * np.array(entry["coefficients_im"], float)
+    real, imaginary = (np.array(entry[key], float) for key in ("coefficients_re", "coefficients_im"))
     rotation = np.array(entry["camera_from_probe_rotation"], float)
     translation = np.array(entry["camera_from_probe_translation_mm"], float)
-    if coefficients.shape != (count, 3) or rotation.shape != (3, 3) or translation.shape != (3,):
+    if not real.shape == imaginary.shape == (count, 3) or rotation.shape != (3, 3) or translation.shape != (3,):
         raise ValueError(
-            f"frame {entry['frame']}: coefficients {coefficients.shape}, rotation {rotation.shape}, "
+            f"frame {entry['frame']}: coefficients {real.shape} and {imaginary.shape}, rotation {rotation.shape}, "
             f"translation {translation.shape}"
         )
-    return FrameTruth(Pose(rotation, translation), coefficients, float(entry["exposure"]), float(entry["time_s"]))
+    return FrameTruth(
+        Pose(rotation, translation), real + 1j * imaginary, float(entry["exposure"]), float(entry["time_s"])
+    )
