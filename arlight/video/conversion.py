@@ -68,9 +68,10 @@ def linear_luma(planes: Planes, format_: PixelFormat, box: Box) -> FloatImage:
 def full_range_luma(planes: Planes, format_: PixelFormat) -> NDArray[np.uint8]:
     """Encoded luma (h, w) as uint8, 0 black and 255 white; R'G'B' is weighted as BT.709 has it."""
     if format_.matrix == "rgb":
-        red, blue = LUMA_WEIGHTS["bt709"]
-        weights = (np.float32(red), np.float32(1.0 - red - blue), np.float32(blue))
-        return kernels.weighted_bytes(*planes, weights, *_luma_scale(format_))  # type: ignore[call-arg]
+        kr, kb = LUMA_WEIGHTS["bt709"]
+        weights = (np.float32(kr), np.float32(1.0 - kr - kb), np.float32(kb))
+        red, green, blue = planes
+        return kernels.weighted_bytes(red, green, blue, weights, *_luma_scale(format_))
     if format_.full_range and planes[0].dtype == np.uint8:
         return planes[0].view(np.uint8)
     return kernels.to_bytes(planes[0], *_luma_scale(format_))
@@ -151,7 +152,8 @@ def _full_resolution(planes: Planes, format_: PixelFormat, box: Box, chroma: Ups
     """Y', Cb, Cr (or R', G', B') at every pixel of a region (h, w, 3), not clamped."""
     black, scale = _luma_scale(format_)
     if format_.matrix == "rgb":
-        return kernels.stack(*planes, *box, black, scale)  # type: ignore[call-arg]
+        red, green, blue = planes
+        return kernels.stack(red, green, blue, *box, black, scale)
     columns, rows = _grids(planes[0].shape, format_, box)
     guided = chroma == "guided" and format_.chroma_shift != (0, 0)
     luma_low = np.zeros((1, 1), np.float32)
@@ -160,7 +162,8 @@ def _full_resolution(planes: Planes, format_: PixelFormat, box: Box, chroma: Ups
         luma_low = kernels.chroma_means(planes[0], black, scale, *taps)
     neutral, span = format_.chroma_code_range
     chroma_scale = (np.float32(neutral), np.float32(1.0 / span))
-    return kernels.full_resolution(*planes, black, scale, *chroma_scale, luma_low, guided, columns, rows)
+    luma, cb, cr = planes
+    return kernels.full_resolution(luma, cb, cr, black, scale, *chroma_scale, luma_low, guided, columns, rows)
 
 
 def _grids(shape: tuple[int, ...], format_: PixelFormat, box: Box) -> tuple[AxisGrid, AxisGrid]:

@@ -9,6 +9,8 @@ from types import TracebackType
 import av
 import av.error
 import numpy as np
+from av.container import InputContainer
+from av.video.stream import VideoStream
 
 from arlight.errors import VideoError
 from arlight.video.conversion import Plane, Planes
@@ -41,7 +43,7 @@ class VideoReader:
         """What the last pass over the file could not read, None where it was whole."""
         self._container = _open(self.path)
         try:
-            self._stream = self._container.streams.video[0]
+            self._stream = _picture_stream(self._container)
             first = self._first_picture()
             self.tags: ColourTags = colour_tags(first)
             """The stream's colour tags, as they stand in it."""
@@ -83,10 +85,15 @@ class VideoReader:
         """Width of a pixel relative to its height, None where the stream does not say."""
         return self._stream.codec_context.sample_aspect_ratio or None
 
+    @property
+    def audio_codecs(self) -> list[str]:
+        """The codec of each sound stream."""
+        return [stream.codec_context.codec.canonical_name for stream in self._container.streams.audio]
+
     def __iter__(self) -> Iterator[Frame]:
         self.damage = None
         with _open(self.path) as container:
-            stream = container.streams.video[0]
+            stream = _picture_stream(container)
             stream.thread_type = "AUTO"
             for index, picture in enumerate(self._pictures(container, stream)):
                 yield self._frame(picture, index)
@@ -115,7 +122,7 @@ class VideoReader:
             )
         return picture
 
-    def _pictures(self, container: "av.container.InputContainer", stream: "av.VideoStream") -> Iterator[av.VideoFrame]:
+    def _pictures(self, container: InputContainer, stream: VideoStream) -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
         broken, decoded = 0, 0
         packets = container.demux(stream)
@@ -168,12 +175,12 @@ def planes_of(picture: av.VideoFrame, format_: PixelFormat) -> Planes:
     planes: list[Plane] = []
     for k, (w, h) in zip(stored, sizes, strict=False):
         plane = planar.planes[k]
-        codes: Plane = np.frombuffer(memoryview(plane), format_.dtype)
-        planes.append(codes.reshape(-1, plane.line_size // codes.itemsize)[:h, :w])
+        codes = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
+        planes.append(codes.view(format_.dtype)[:h, :w])  # type: ignore[arg-type]
     return tuple(planes)
 
 
-def _open(path: Path) -> "av.container.InputContainer":
+def _open(path: Path) -> InputContainer:
     if not path.is_file():
         raise VideoError(f"{path}: expected a video file, found {'a folder' if path.is_dir() else 'nothing'} there")
     if path.stat().st_size == 0:
@@ -189,3 +196,9 @@ def _open(path: Path) -> "av.container.InputContainer":
         container.close()
         raise VideoError(f"{path}: has no video stream, expected one; name the clip, not its sound or its data")
     return container
+
+
+def _picture_stream(container: InputContainer) -> VideoStream:
+    """The stream to read: not a cover picture, where there is another."""
+    best = container.streams.best("video")
+    return best if isinstance(best, VideoStream) else container.streams.video[0]

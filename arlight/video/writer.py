@@ -15,7 +15,7 @@ from av.container import OutputContainer
 from av.video.stream import VideoStream
 
 from arlight.errors import OutputError
-from arlight.video.audio import AudioCopy
+from arlight.video.audio import AudioCopy, check_audio
 from arlight.video.conversion import Planes
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import CHROMA_LOCATIONS, PixelFormat, chroma_offset_px, colour_format
@@ -64,7 +64,8 @@ class VideoWriter:
             audio: copy the source's sound.
 
         Raises:
-            OutputError: the output is the source, is a folder, or its folder is missing or not writable.
+            OutputError: the output is the source, is a folder, its folder is missing or not writable, or its container
+                cannot hold the source's sound.
         """
         self.path = Path(path)
         """The output."""
@@ -76,6 +77,8 @@ class VideoWriter:
         self._audio: AudioCopy | None = None
         self._last_time = -(2**62)
         check_output(self.path, [like.path] if like else [])
+        if like and audio:
+            check_audio(self.path, like.path, like.audio_codecs)
 
     def write(self, frame: Frame) -> None:
         """Appends a frame.
@@ -164,7 +167,7 @@ class VideoWriter:
 
 
 def encoded_format(frame: Frame) -> PixelFormat:
-    """The 4:2:0 format that a frame is encoded in: matrix, range, transfer and, if it is 4:2:0, chroma sites are its own."""
+    """The 4:2:0 format a frame is encoded in: its own matrix, range, transfer and, where it has them, chroma sites."""
     colour = colour_format(frame.format, frame.size)
     offset = colour.chroma_offset_px
     if colour.chroma_shift != (1, 1) or offset not in CHROMA_LOCATIONS.values():
