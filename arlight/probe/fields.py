@@ -1,7 +1,6 @@
 """Typed access to the fields of a JSON file; what is wrong is refused with file, field and what is allowed."""
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,9 +75,9 @@ class Field:
     def number(self, low: float, high: float) -> float:
         """A finite number in [low, high]."""
         value = self.value
-        # compared before conversion: a JSON integer may be too long for a float
+        # compared before conversion: a JSON integer may be too long for a float; NaN fails the comparison
         numeric = isinstance(value, int | float) and not isinstance(value, bool)
-        if not numeric or math.isnan(value) or not low <= value <= high:
+        if not numeric or not low <= value <= high:
             raise self.refuse(f"a number from {low:g} to {high:g}")
         return float(value)
 

@@ -97,8 +97,8 @@ def _steps(mirror_film: bool) -> list[str]:
     )
     return [
         "Print bottom.pdf on paper, top.pdf on the transparency and frame.pdf on heavy paper, all on the same printer, "
-        "at <b>100 % (actual size)</b>, best quality, black ink only, page-fitting and toner-saving options off. The "
-        "grey levels are encoded for sRGB, as printers expect: apply no other correction.",
+        "at <b>100\u00a0% (actual size)</b>, best quality, black ink only, page-fitting and toner-saving options off. "
+        "The grey levels are encoded for sRGB, as printers expect: apply no other correction.",
         "Lay a steel ruler on each printed ruler: it must measure <b>100.0 mm</b>. If not, scaling is still on.",
         "Cut out the frame's window along the thin line. Trim the layers along their corner marks once film and paper "
         "are taped: until then the marks and crosses in the margin are needed.",

@@ -10,9 +10,10 @@ from arlight.errors import ProbeError
 from arlight.fourier import MAX_ORDER
 from arlight.optics import Slab
 from arlight.probe.design import DESIGNS, Block, Design, Probe
-from arlight.probe.frame import DICTIONARY, Frame, frame_around, place_markers, place_wedge
+from arlight.probe.frame_layout import DICTIONARY, FrameLayout, frame_around, place_markers, place_wedge
 from arlight.probe.grid import Cell, Grid, choose_grid
 from arlight.probe.pages import PAPERS, Paper, fits_page, largest_sheet_mm
+from arlight.probe.validation import MOST_PIXELS_PER_SIDE
 
 PHASES_DEG: dict[Design, tuple[float, ...]] = {"matched": (0.0, 90.0, 180.0, 270.0), "doubled": (0.0, 90.0)}
 """tau of the blocks that each frequency gets."""
@@ -20,7 +21,6 @@ VIEW_LIMIT_DEG = 70.0
 """Viewers up to this angle off the normal see a block's window free of its neighbours."""
 
 _FEWEST_PIXELS_PER_PERIOD = 4.0
-_MOST_PIXELS_PER_SIDE = 20000
 
 
 def design_probe(
@@ -72,9 +72,9 @@ def design_probe(
         film_transmittance=float(film_transmittance),
     )
     probe = _laid_out(blank, window_periods, paper)
-    if max(probe.sheet_mm) * pixels_per_mm > _MOST_PIXELS_PER_SIDE:
+    if max(probe.sheet_mm) * pixels_per_mm > MOST_PIXELS_PER_SIDE:
         raise ProbeError(
-            f"the sheet would be {max(probe.sheet_mm):.0f} mm long, more than {_MOST_PIXELS_PER_SIDE} pixels at "
+            f"the sheet would be {max(probe.sheet_mm):.0f} mm long, more than {MOST_PIXELS_PER_SIDE} pixels at "
             f"{pixels_per_mm:g} pixels per mm; choose a lower order, thinner glass or fewer pixels per mm"
         )
     if paper is not None:
@@ -125,7 +125,7 @@ def _laid_out(probe: Probe, window_periods: int, paper: Paper | None) -> Probe:
     size, window = block_size_mm(probe.slab, window_periods), window_periods * probe.slab.period_mm
     pages = PAPERS if paper is None else (paper,)
 
-    def frame_of(columns: int, rows: int) -> Frame:
+    def frame_of(columns: int, rows: int) -> FrameLayout:
         return frame_around((columns * size, rows * size), probe.pixels_per_mm)
 
     def fits(columns: int, rows: int) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.probe.design import Block, Design, Marker, Probe
-from arlight.probe.frame import window_mm
+from arlight.probe.frame_layout import window_mm
 
 Raster = NDArray[np.float32]
 

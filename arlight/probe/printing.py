@@ -18,7 +18,7 @@ from reportlab.pdfgen.canvas import Canvas
 
 from arlight.color import encoded_from_linear
 from arlight.probe.design import Probe
-from arlight.probe.frame import window_mm
+from arlight.probe.frame_layout import window_mm
 from arlight.probe.pages import MARK_BAND_MM, PAGE_MM, PRINT_MARGIN_MM, RULER_BAND_MM, TITLE_BAND_MM, Paper
 from arlight.probe.patterns import Raster
 from arlight.probe.rasters import Rasters

@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 # blocks share edges whose coordinates were rounded when they were written
 _SLACK_MM = 0.01
 
+MOST_PIXELS_PER_SIDE = 20000
+"""Larger rasters than this fit no memory."""
+
 
 def check_geometry(probe: Probe, content: Field) -> None:
     """Refuse a probe whose parts contradict each other.
@@ -28,6 +31,16 @@ def check_geometry(probe: Probe, content: Field) -> None:
         raise markers.refuse("at least one marker to find the sheet by")
     if not any(block.kind == "pattern" for block in probe.blocks):
         raise blocks.refuse("at least one block of kind pattern", "none")
+    if (
+        not 1.0
+        <= min(probe.sheet_mm) * probe.pixels_per_mm
+        <= max(probe.sheet_mm) * probe.pixels_per_mm
+        <= (MOST_PIXELS_PER_SIDE)
+    ):
+        raise content.at("pixels_per_mm").refuse(
+            f"a resolution that gives the sheet of {probe.sheet_mm[0]:g} x {probe.sheet_mm[1]:g} mm 1 to "
+            f"{MOST_PIXELS_PER_SIDE} pixels a side"
+        )
     _check_unique([marker.id for marker in probe.markers], markers)
     _check_unique([block.id for block in probe.blocks], blocks)
     for marker, field in zip(probe.markers, markers.items(), strict=True):

@@ -31,7 +31,7 @@ _DARKEST_REFLECTANCE = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FrameLayout:
     """The frame around a field, in whole raster pixels where anything is printed."""
 
     sheet_px: tuple[int, int]
@@ -59,7 +59,7 @@ class Frame:
         return (x_px - width / 2.0) / self.pixels_per_mm, (height / 2.0 - y_px) / self.pixels_per_mm
 
 
-def frame_around(field_mm: tuple[float, float], pixels_per_mm: float) -> Frame:
+def frame_around(field_mm: tuple[float, float], pixels_per_mm: float) -> FrameLayout:
     """The frame for a block field of this width and height."""
     module = ceil(_MODULE_MM * pixels_per_mm)
     quiet = module + ceil(_QUIET_SLACK_MM * pixels_per_mm)
@@ -67,7 +67,7 @@ def frame_around(field_mm: tuple[float, float], pixels_per_mm: float) -> Frame:
     # three markers along a side, and a step of the wedge between two of them
     shortest = 3 * MODULES * module + 6 * quiet + 2 * ceil(_STEP_MM * pixels_per_mm + 1)
     width, height = (max(2 * (ceil(side / 2.0 * pixels_per_mm) + band), shortest + shortest % 2) for side in field_mm)
-    return Frame((width, height), pixels_per_mm, module, quiet)
+    return FrameLayout((width, height), pixels_per_mm, module, quiet)
 
 
 def window_mm(probe: Probe) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def window_mm(probe: Probe) -> tuple[float, float]:
     return 2.0 * half[0], 2.0 * half[1]
 
 
-def place_markers(frame: Frame) -> tuple[Marker, ...]:
+def place_markers(frame: FrameLayout) -> tuple[Marker, ...]:
     """Markers in the corners and at uniform intervals between them, numbered clockwise from the top left."""
     return tuple(
         Marker(number, tuple(frame.mm(*corner) for corner in _square(left, top, frame.marker_px)))
@@ -88,7 +88,7 @@ def place_markers(frame: Frame) -> tuple[Marker, ...]:
     )
 
 
-def place_wedge(frame: Frame, first_id: int) -> tuple[Block, ...]:
+def place_wedge(frame: FrameLayout, first_id: int) -> tuple[Block, ...]:
     """The steps of the grey wedge, between the markers, clear of their quiet zones.
 
     Every reflectance stands twice, at points opposite each other about the sheet's centre where the frame has room for
@@ -112,12 +112,12 @@ def place_wedge(frame: Frame, first_id: int) -> tuple[Block, ...]:
     )
 
 
-def _step_px(frame: Frame) -> int:
+def _step_px(frame: FrameLayout) -> int:
     """Side of a wedge step, even so that its centre is a pixel's corner [px]."""
     return 2 * round(_STEP_MM / 2.0 * frame.pixels_per_mm)
 
 
-def _step_places(frame: Frame) -> list[tuple[int, int]]:
+def _step_places(frame: FrameLayout) -> list[tuple[int, int]]:
     """Centres of the wedge steps, clockwise from the sheet's top left, the fewest a gap that suffice [px]."""
     width, height = frame.sheet_px
     middle = frame.quiet_px + frame.marker_px // 2
@@ -133,7 +133,7 @@ def _step_places(frame: Frame) -> list[tuple[int, int]]:
     )
 
 
-def _between(frame: Frame, side_px: int, most: int) -> list[int]:
+def _between(frame: FrameLayout, side_px: int, most: int) -> list[int]:
     """Centres of steps along a side, evenly in each gap between two markers' quiet zones, at most so many a gap."""
     places: list[int] = []
     step, apart = _step_px(frame), ceil(_STEP_GAP_MM * frame.pixels_per_mm)
@@ -160,7 +160,7 @@ def _square(left: int, top: int, side: int) -> tuple[tuple[int, int], ...]:
     return (left, top), (left + side, top), (left + side, top + side), (left, top + side)
 
 
-def _side_places(frame: Frame, side_px: int) -> list[int]:
+def _side_places(frame: FrameLayout, side_px: int) -> list[int]:
     """Where markers begin along a side, corner to corner, both included."""
     first, last = frame.quiet_px, side_px - frame.quiet_px - frame.marker_px
     gaps = min(max(2, round((last - first) / (_MARKER_PITCH_MM * frame.pixels_per_mm))), _MOST_GAPS)
@@ -169,7 +169,7 @@ def _side_places(frame: Frame, side_px: int) -> list[int]:
     return [first + o for o in offsets] + [last - o for o in offsets[(gaps - 1) // 2 :: -1]]
 
 
-def _marker_places(frame: Frame) -> list[tuple[int, int]]:
+def _marker_places(frame: FrameLayout) -> list[tuple[int, int]]:
     """Top left corners of the markers, clockwise from the sheet's top left [px]."""
     width, height = frame.sheet_px
     across, down = _side_places(frame, width), _side_places(frame, height)
