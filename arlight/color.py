@@ -50,5 +50,5 @@ def encoded_from_linear(linear: ArrayLike, transfer: Transfer = "srgb") -> NDArr
         case "gamma28":
             return x ** np.float32(1 / 2.8)
         case "hlg":
-            upper = HLG_A * np.log(np.maximum(12.0 * x - HLG_B, 1.0)) + HLG_C
+            upper = HLG_A * np.log(np.maximum(12.0 * x - HLG_B, 0.5)) + HLG_C
             return np.where(x <= 1.0 / 12.0, np.sqrt(3.0 * x), upper).astype(np.float32)

@@ -11,7 +11,9 @@ TRANSFERS = get_args(Transfer)
 @pytest.mark.parametrize("transfer", TRANSFERS)
 def test_encoding_inverts_decoding(transfer):
     encoded = np.linspace(0, 1, 1001)
-    np.testing.assert_allclose(encoded_from_linear(linear_from_encoded(encoded, transfer), transfer), encoded, atol=3e-4)
+    np.testing.assert_allclose(
+        encoded_from_linear(linear_from_encoded(encoded, transfer), transfer), encoded, atol=3e-4
+    )
     linear = np.linspace(0, 1, 1001) ** 3
     np.testing.assert_allclose(linear_from_encoded(encoded_from_linear(linear, transfer), transfer), linear, atol=1e-3)
 
