@@ -31,12 +31,8 @@ def check_geometry(probe: Probe, content: Field) -> None:
         raise markers.refuse("at least one marker to find the sheet by")
     if not any(block.kind == "pattern" for block in probe.blocks):
         raise blocks.refuse("at least one block of kind pattern", "none")
-    if (
-        not 1.0
-        <= min(probe.sheet_mm) * probe.pixels_per_mm
-        <= max(probe.sheet_mm) * probe.pixels_per_mm
-        <= (MOST_PIXELS_PER_SIDE)
-    ):
+    pixels = [side * probe.pixels_per_mm for side in probe.sheet_mm]
+    if min(pixels) < 1.0 or max(pixels) > MOST_PIXELS_PER_SIDE:
         raise content.at("pixels_per_mm").refuse(
             f"a resolution that gives the sheet of {probe.sheet_mm[0]:g} x {probe.sheet_mm[1]:g} mm 1 to "
             f"{MOST_PIXELS_PER_SIDE} pixels a side"

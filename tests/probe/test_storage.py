@@ -194,7 +194,9 @@ JSON = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(data=st.data())
 def test_any_change_is_read_or_refused(tmp_path, content, data):
     path = data.draw(st.sampled_from(list(paths_of(content))))
@@ -207,7 +209,9 @@ def test_any_change_is_read_or_refused(tmp_path, content, data):
     assert isinstance(outcome, Probe) or str(file) in str(outcome)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(noise=st.binary(max_size=60))
 def test_any_bytes_are_refused(tmp_path, noise):
     file = tmp_path / "noise.json"
