@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.probe.design import Probe
 from arlight.tracking.alignment_kernels import FEATURES, LIGHTING, POSE, linearise
+from arlight.tracking.lens import camera_parameters
 from arlight.tracking.planar_pose import is_seen_from_above
 from arlight.tracking.template import FiducialTemplate
 from arlight.tracking.template_kernels import render
@@ -99,6 +100,27 @@ _FINEST = _Level(8, 0.01, (0.5, OCCLUDED_BELOW), 1)
 _COARSER = _Level(5, 0.2, (0.2, 0.4), 2)
 
 
+@dataclass(frozen=True, slots=True)
+class _Workspace:
+    """Memory for one number of points, contiguous for the compiler's sake; shapes as the kernels name them."""
+
+    index_u: NDArray[np.int64]
+    index_v: NDArray[np.int64]
+    points: Array
+    values: Array
+    sharper: Array
+    features: Array
+    scratch: Array
+
+    @classmethod
+    def of_template(cls, template: FiducialTemplate, share: int) -> "_Workspace":
+        """For one of `share` points."""
+        m, p = template.index_u.shape[0], template.index_u.shape[1] // share
+        index_u, index_v = (np.ascontiguousarray(index[:, :p]) for index in (template.index_u, template.index_v))
+        points, values, sharper = np.zeros((m, 2, p)), np.zeros((m, 3, p)), np.zeros((m, 3, p))
+        return cls(index_u, index_v, points, values, sharper, np.zeros((m, FEATURES, p)), np.zeros((2, p)))
+
+
 class FiducialAlignment:
     """Aligns the fiducials of a sheet to pictures of it.
 
@@ -120,10 +142,9 @@ class FiducialAlignment:
         middle = places[:, :2] + template.size / 2.0 * (places[:, 2:4] + places[:, 4:6])
         axes = np.stack([middle, middle + places[:, 2:4], middle + places[:, 4:6]], axis=1)
         self._axes = np.concatenate([axes, np.zeros((*axes.shape[:2], 1))], axis=2)
-        m, p = template.index_u.shape
-        self._points, self._values, self._sharper = np.zeros((m, 2, p)), np.zeros((m, 3, p)), np.zeros((m, 3, p))
-        self._coefficients, self._features = np.zeros((m, LIGHTING)), np.zeros((m, FEATURES, p))
-        self._scratch, self._gram = np.zeros((2, p)), np.zeros((m, FEATURES, FEATURES))
+        m = len(places)
+        self._workspaces = {level.share: _Workspace.of_template(template, level.share) for level in (_FINEST, _COARSER)}
+        self._coefficients, self._gram = np.zeros((m, LIGHTING)), np.zeros((m, FEATURES, FEATURES))
         self._correlation, self._weight, self._normal = np.zeros(m), np.zeros(m), np.zeros((POSE + 1, POSE + 1))
 
     def region(self, pose: Pose) -> tuple[int, int, int, int] | None:
@@ -173,17 +194,17 @@ class FiducialAlignment:
         """Gauss-Newton at one resolution; None when no marker takes part."""
         level = _FINEST if shrink == 1 else _COARSER
         sharpness = math.sqrt(blur_px**2 + SAMPLING_VARIANCE_PX2 * (shrink**2 - 1))
-        self._render(start, sharpness, max(sharpness, 0.9 * shrink))
+        work = self._workspaces[level.share]
+        self._render(work, start, sharpness, max(sharpness, 0.9 * shrink))
         self._coefficients[:] = 0.0
         codes, table, window = picture.level(shrink)
-        count = self._points.shape[2] // level.share
         rotation, translation = start.rotation, start.translation
         for k in range(level.steps + 1):
             parameters = np.concatenate([np.ravel(rotation), translation])
             used = linearise(
                 codes, table, window, self._parameters, parameters, self._template.places, self._template.size,
-                self._points, self._values, count, level.floors[min(k, 1)], _OUTLIER_LIMIT, self._coefficients,
-                self._features, self._scratch, self._gram, self._correlation, self._weight, self._normal,
+                work.points, work.values, level.floors[min(k, 1)], _OUTLIER_LIMIT, self._coefficients,
+                work.features, work.scratch, self._gram, self._correlation, self._weight, self._normal,
             )  # fmt: skip
             if used == 0:
                 return None
@@ -195,21 +216,21 @@ class FiducialAlignment:
             translation = translation + step[3:]
         return Pose(rotation, translation)
 
-    def _render(self, pose: Pose, blur_px: float, reach_px: float) -> None:
+    def _render(self, work: "_Workspace", pose: Pose, blur_px: float, reach_px: float) -> None:
         """The template as it looks at a pose, blurred on each marker's axes as isotropic blur does there."""
         pixels = self._camera.project(pose, self._axes).reshape(-1, 3, 2)
-        along_u, along_v = (pixels[:, k] - pixels[:, 0] for k in (1, 2))
+        along_u, along_v = pixels[:, 1] - pixels[:, 0], pixels[:, 2] - pixels[:, 0]
         area = np.maximum(np.abs(along_u[:, 0] * along_v[:, 1] - along_u[:, 1] * along_v[:, 0]), 1e-9)
-        modules_per_px = np.stack([np.linalg.norm(along_v, axis=1), np.linalg.norm(along_u, axis=1)], axis=1)
-        modules_per_px /= area[:, None]
+        modules_per_px = np.stack([np.hypot(*along_v.T), np.hypot(*along_u.T)], axis=1) / area[:, None]
         self._sigma, self._reach = blur_px * modules_per_px, reach_px * modules_per_px
-        self._draw(self._sigma, self._values)
+        self._draw(work, self._sigma, work.values)
 
-    def _draw(self, sigma: Array, values: Array) -> None:
+    def _draw(self, work: "_Workspace", sigma: Array, values: Array) -> None:
         t = self._template
         render(
-            t.black, t.position_base, t.position_spread, t.index_u, t.index_v, sigma, self._reach, self._points, values
-        )
+            t.black, t.position_base, t.position_spread, work.index_u, work.index_v,
+            sigma, self._reach, work.points, values,
+        )  # fmt: skip
 
     def _residual_rms_px(self, pose: Pose, used: NDArray[np.bool_]) -> float:
         """How far the used markers would still move, each by itself, in the camera's x and y."""
@@ -233,18 +254,21 @@ class FiducialAlignment:
         zero, one = np.zeros_like(x), np.ones_like(x)
         view = np.stack([one, zero, -x / z, zero, one, -y / z], axis=1).reshape(-1, 2, 3)
         view *= (self._parameters[0] / z)[:, None, None]
-        jacobian = np.concatenate([np.cross(turned[:, None, :], view), view], axis=2)
-        variance = float(np.einsum("cij,jk,cik->", jacobian, covariance, jacobian)) / len(x)
+        turning = np.stack([-_cross(q) for q in turned])
+        jacobian = np.concatenate([view @ turning, view], axis=2)
+        variance = float(np.sum((jacobian @ covariance) * jacobian)) / len(x)
         return math.sqrt(variance) if variance >= 0.0 else math.inf
 
     def _next_blur(self, blur_px: float, used: NDArray[np.bool_]) -> float:
         """One step of the blur's estimate: the change of variance that best explains the pixels near the edges."""
-        variance_step = 0.2 * blur_px**2
-        self._draw(self._sigma * math.sqrt(1.0 - 0.2), self._sharper)
-        light = self._features[used, LIGHTING + POSE]
+        share, work, part = 0.2, self._workspaces[_FINEST.share], self._workspaces[_COARSER.share]
+        self._draw(part, self._sigma * math.sqrt(1.0 - share), part.sharper)
+        number = part.sharper.shape[2]
+        features, drawn = work.features[used, :, :number], work.values[used, 0, :number]
+        light = features[:, LIGHTING + POSE]
         inside = (light >= 0.0)[:, None]
-        lighting = self._features[used, :LIGHTING] * inside
-        wanted = np.stack([(self._values - self._sharper)[used, 0] / variance_step, light], axis=1) * inside
+        lighting = features[:, :LIGHTING] * inside
+        wanted = np.stack([(drawn - part.sharper[used, 0]) / (share * blur_px**2), light], axis=1) * inside
         gram = lighting @ lighting.transpose(0, 2, 1) + 1e-9 * np.eye(LIGHTING)
         wanted -= (np.linalg.solve(gram, lighting @ wanted.transpose(0, 2, 1))).transpose(0, 2, 1) @ lighting
         per_gain = self._weight[used] / self._coefficients[used, 0]
@@ -255,26 +279,13 @@ class FiducialAlignment:
         return float(np.clip(math.sqrt(variance), *_BLUR_RANGE_PX))
 
 
-def camera_parameters(camera: Camera) -> Array:
-    """(25,) focal lengths, principal point, 12 distortion terms, and the 3x3 tilt of the sensor, as in OpenCV."""
-    k = camera.camera_matrix
-    distortion = np.zeros(14)
-    distortion[: camera.distortion.size] = camera.distortion
-    return np.concatenate(
-        [[k[0, 0], k[1, 1], k[0, 2], k[1, 2]], distortion[:12], _tilt(distortion[12], distortion[13]).ravel()]
-    )
-
-
-def _tilt(around_x: float, around_y: float) -> Array:
-    """Homography of a sensor tilted by two angles [rad] (OpenCV's tilted model)."""
-    cx, sx, cy, sy = math.cos(around_x), math.sin(around_x), math.cos(around_y), math.sin(around_y)
-    rotation = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-    onto = np.array([[rotation[2, 2], 0, -rotation[0, 2]], [0, rotation[2, 2], -rotation[1, 2]], [0, 0, 1]])
-    return onto @ rotation
-
-
 def _solve(normal: Array) -> Array:
     """(6,) the pose's step from its normal equations; directions that they leave open stay at rest."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal)[:POSE], 1e-300))
     matrix = normal[:POSE, :POSE] * np.outer(scale, scale) + 1e-9 * np.eye(POSE)
     return -scale * np.linalg.solve(matrix, scale * normal[:POSE, POSE])
+
+
+def _cross(q: Array) -> Array:
+    """The matrix that takes v to q x v."""
+    return np.array([[0.0, -q[2], q[1]], [q[2], 0.0, -q[0]], [-q[1], q[0], 0.0]])

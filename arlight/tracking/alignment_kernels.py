@@ -11,26 +11,13 @@ import math
 import numpy as np
 from numba import njit
 
+from arlight.tracking.lens import project
+
 LIGHTING = 4
 POSE = 6
 FEATURES = LIGHTING + POSE + 1
 SMALLEST_VARIANCE = 4e-4
 """Residual variance, relative to the gain's square, that no marker is trusted beyond: 2 % of the contrast."""
-
-
-@njit(cache=True, error_model="numpy")
-def project(camera, x, y):
-    """Pixel of normalised image coordinates; camera: fx, fy, cx, cy, 12 distortion terms, 9 of the tilt (OpenCV)."""
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (camera[4] + r2 * (camera[5] + r2 * camera[8]))
-    radial /= 1.0 + r2 * (camera[9] + r2 * (camera[10] + r2 * camera[11]))
-    p1, p2 = camera[6], camera[7]
-    xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (camera[12] + r2 * camera[13])
-    yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (camera[14] + r2 * camera[15])
-    w = camera[22] * xd + camera[23] * yd + camera[24]
-    xt = (camera[16] * xd + camera[17] * yd + camera[18]) / w
-    yt = (camera[19] * xd + camera[20] * yd + camera[21]) / w
-    return camera[0] * xt + camera[2], camera[1] * yt + camera[3]
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,31 +126,31 @@ def eliminate_lighting(gram, coefficients):
 
 
 @njit(cache=True, error_model="numpy")
-def linearise(codes, table, window, camera, pose, places, size, points, values, count, floor, limit,
+def linearise(codes, table, window, camera, pose, places, size, points, values, floor, limit,
               coefficients, features, scratch, gram, correlation, weight, normal):  # fmt: skip
     """The pose's normal equations from all markers at a pose; the number of markers that take part.
 
     Args:
         codes ... values: as in `observe`, for all markers.
-        count: how many leading points of each marker to use.
         floor: correlation below which a marker counts as occluded.
         limit: as in `weigh`.
         coefficients: (m, 4) lighting, read for the weights and replaced.
-        features (m, 11, p), scratch (2, p), gram (m, 11, 11): left behind, the lighting eliminated from `gram`.
+        features (m, 11, p), scratch (2, p), gram (m, 11, 11): left behind, the lighting eliminated from `gram`; of each
+            marker's points, only the first p are used.
         correlation, weight: (m,) of each marker; weight 0 is left out.
         normal: (7, 7) sum over the markers of weight * gram[4:, 4:], in units of their gains.
     """
     normal[:] = 0.0
     used = 0
     for m in range(gram.shape[0]):
-        f = features[m, :, :count]
+        f = features[m]
         observe(codes, table, window, camera, pose, places[m], size, points[m], values[m], f)
         inside, correlation[m] = weigh(f, coefficients[m], limit, scratch[0])
         weighted_gram(f, scratch[0], scratch[1], gram[m])
         eliminate_lighting(gram[m], coefficients[m])
         gain = coefficients[m, 0]
         weight[m] = 0.0
-        if inside < 0.5 * count or correlation[m] < floor or gain <= 0.0:
+        if inside < 0.5 * f.shape[1] or correlation[m] < floor or gain <= 0.0:
             continue
         variance = max(gram[m, FEATURES - 1, FEATURES - 1], 0.0) / (gain * gain * inside)
         weight[m] = 1.0 / (variance + SMALLEST_VARIANCE)

@@ -66,7 +66,13 @@ class FiducialDetector:
         longest = float(max(image.shape))
         parameters = cv2.aruco.DetectorParameters()
         parameters.minMarkerPerimeterRate = min(_SHORTEST_PERIMETER_PX / longest, 0.03)
+        # Settings below differ from OpenCV's for foreshortened markers a few pixels high and for weak contrast.
         parameters.polygonalApproxAccuracyRate = 0.05
+        parameters.minCornerDistanceRate = 0.01
+        parameters.minMarkerDistanceRate = 0.02
+        parameters.minDistanceToBorder = 1
+        parameters.perspectiveRemovePixelPerCell = 8
+        parameters.adaptiveThreshConstant = 4.0
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         found, indices, _ = cv2.aruco.ArucoDetector(self._own, parameters).detectMarkers(image)
         if indices is None:
