@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from arlight.gl import create_context, shader_source
 from arlight.rendering.gloss import GLOSS_SIDE
 from arlight.rendering.mesh import Mesh
+from arlight.rendering.projection import View
+from arlight.rendering.transfer import Transfer
 
 Image = NDArray[np.float32]
 
@@ -20,7 +22,8 @@ class ObjectRenderer:
     def __init__(
         self,
         mesh: Mesh,
-        openness: NDArray[np.float32],
+        transfer: Transfer,
+        gloss_rows: NDArray[np.float32],
         roughness: float,
         normal_reflectance: float,
         supersampling: int = 2,
@@ -29,7 +32,8 @@ class ObjectRenderer:
 
         Args:
             mesh: placed, probe frame [mm].
-            openness: (n, 9) harmonics of each vertex's visibility.
+            transfer: the mesh's own.
+            gloss_rows: (side * side, m) of the octahedral map of lobe-averaged radiance.
             roughness: of the gloss, in [0.05, 1].
             normal_reflectance: Fresnel reflectance at normal incidence, 0 for a matte object.
             supersampling: samples along a pixel's side.
@@ -37,6 +41,7 @@ class ObjectRenderer:
         Raises:
             RenderingUnavailable: no headless OpenGL.
         """
+        self._transfer, self._gloss_rows = transfer, gloss_rows
         self._thread = threading.get_ident()
         self._samples = supersampling
         self._closed = mesh.closed
@@ -62,7 +67,7 @@ class ObjectRenderer:
                 (self._clip, "4f", "clip"),
                 (self._diffuse, "3f", "diffuse_radiance"),
                 (
-                    self._context.buffer(_static_attributes(mesh, openness)),
+                    self._context.buffer(_static_attributes(mesh, transfer.openness)),
                     "3f 3f 3f 3f 3f 3f 3f",
                     "position_mm",
                     "normal",
@@ -77,45 +82,38 @@ class ObjectRenderer:
         )
         self._target: moderngl.Framebuffer | None = None
 
-    def draw(
-        self,
-        clip: NDArray[np.float32],
-        diffuse_radiance: NDArray[np.float32],
-        gloss: NDArray[np.float32],
-        eye_mm: NDArray[np.float64],
-        size: tuple[int, int],
-    ) -> Image:
+    def draw(self, view: View, packed: NDArray[np.float32]) -> Image:
         """One picture of the object.
 
         Args:
-            clip: (n, 4) clip coordinates for a viewport of `size`.
-            diffuse_radiance: (n, 3) radiance of a white matte surface at each vertex.
-            gloss: (side * side, 3) octahedral map of lobe-averaged radiance.
-            eye_mm: (3,) the camera's centre, probe frame [mm].
-            size: width and height of the viewport [px].
+            view: where the camera sees it.
+            packed: (m, 3) real-packed coefficients.
 
         Returns:
-            (h, w, 4) linear radiance times coverage, and coverage.
+            (h, w, 4) linear radiance times coverage, and coverage, of the view's region.
 
         Raises:
             RuntimeError: called from another thread than the one that made it.
         """
         if threading.get_ident() != self._thread:
             raise RuntimeError("an OpenGL context belongs to its thread: draw from the thread that made the renderer")
+        size = view.region.size
         width, height = size[0] * self._samples, size[1] * self._samples
-        target = self._target_of(width, height)
-        target.use()
-        target.viewport = (0, 0, width, height)
-        self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if self._closed else 0))
-        target.clear(viewport=(0, 0, width, height))
-        self._clip.write(np.ascontiguousarray(clip, np.float32))
-        self._diffuse.write(np.ascontiguousarray(diffuse_radiance, np.float32))
-        self._gloss.write(np.ascontiguousarray(gloss, np.float32))
-        self._set("eye_mm", tuple(float(v) for v in eye_mm))
-        self._gloss.use(0)
-        self._textures.use(1)
-        self._triangles.render()
-        pixels = np.frombuffer(target.read((0, 0, width, height), 4, dtype="f4"), np.float32)
+        # others may have made their own context current in this thread
+        with self._context:
+            self._clip.write(view.projected.clip_coordinates(view.region))
+            self._diffuse.write(np.ascontiguousarray(self._transfer.vertex_rows @ packed))
+            self._gloss.write(np.ascontiguousarray(self._gloss_rows @ packed))
+            self._set("eye_mm", tuple(float(v) for v in view.camera_from_probe.camera_centre_mm))
+            target = self._target_of(width, height)
+            target.use()
+            target.viewport = (0, 0, width, height)
+            self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if self._closed else 0))
+            target.clear(viewport=(0, 0, width, height))
+            self._gloss.use(0)
+            self._textures.use(1)
+            self._triangles.render()
+            pixels = np.frombuffer(target.read((0, 0, width, height), 4, dtype="f4"), np.float32)
         # over a whole number of samples this is their plain mean
         return np.asarray(cv2.resize(pixels.reshape(height, width, 4), size, interpolation=cv2.INTER_AREA))
 
@@ -153,5 +151,5 @@ def _static_attributes(mesh: Mesh, openness: NDArray[np.float32]) -> NDArray[np.
     place = np.zeros((len(mesh.vertices_mm), 3), np.float32)
     if mesh.uv is not None and mesh.layer is not None:
         place[:, :2], place[:, 2] = mesh.uv, mesh.layer
-    columns = [mesh.vertices_mm, mesh.normals, mesh.base_colour, place, openness]
-    return np.ascontiguousarray(np.concatenate(columns, axis=1), np.float32)
+    columns = [np.asarray(c, np.float32) for c in (mesh.vertices_mm, mesh.normals, mesh.base_colour, place, openness)]
+    return np.concatenate(columns, axis=1)

@@ -154,5 +154,5 @@ def _distinct(images: list[NDArray[np.uint8]]) -> tuple[NDArray[np.uint8], list[
     while side > 128 and len(stack) * side * side > 8 * _TEXTURE_SIDE**2:
         side //= 2
     if side < _TEXTURE_SIDE:
-        stack = [cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA) for image in stack]
+        stack = [np.asarray(cv2.resize(i, (side, side), interpolation=cv2.INTER_AREA), np.uint8) for i in stack]
     return np.stack(stack), [order[key] for key in keys]

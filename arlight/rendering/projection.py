@@ -60,6 +60,18 @@ class Projected:
         return clip
 
 
+@dataclass(frozen=True, slots=True)
+class View:
+    """An object as the camera sees it in one frame."""
+
+    camera_from_probe: Pose
+    """The pose."""
+    projected: Projected
+    """The object's vertices."""
+    region: Region
+    """The part of the frame to draw [px]."""
+
+
 def project(camera: Camera, camera_from_probe: Pose, points_mm: ArrayLike) -> Projected:
     """Points (n, 3) of the probe frame [mm] as the camera sees them; without the lens where its model may fold back."""
     points = camera_from_probe.transform(points_mm)

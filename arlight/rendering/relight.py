@@ -1,7 +1,7 @@
 """Lights an object on the sheet with estimated coefficients and sets it into the frame."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,8 @@ from arlight.rendering.composite import cover, shade_plane
 from arlight.rendering.draw import ObjectRenderer
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.mesh import Mesh
-from arlight.rendering.projection import Projected, project, union
+from arlight.rendering.projection import View, project, union
+from arlight.rendering.pyrender_drawer import PyrenderDrawer
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.transfer import precompute_transfer
 from arlight.rendering.visibility import Progress
@@ -22,6 +23,19 @@ from arlight.video.frame import Frame, Region
 
 _DARKENING = 0.004
 """A shadow that takes less than this share of the light is below half an 8-bit level and is not drawn."""
+
+
+RendererName = Literal["moderngl", "pyrender"]
+
+
+class ObjectDrawer(Protocol):
+    """What draws the object; belongs to the thread that made it."""
+
+    def draw(self, view: View, packed: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Linear premultiplied radiance and coverage (h, w, 4) of the view's region, by packed coefficients (m, 3)."""
+
+    def release(self) -> None:
+        """Give the context back."""
 
 
 class ProbeGlass(Protocol):
@@ -58,6 +72,8 @@ class RelightSettings:
     """Side of the map of the shadow on the sheet."""
     supersampling: int = 2
     """Samples along a pixel's side."""
+    renderer: RendererName = "moderngl"
+    """`moderngl`: precomputed transfer; `pyrender`: the light as a few directional lights with shadow maps, slow."""
 
 
 class Relighter:
@@ -93,10 +109,9 @@ class Relighter:
         self._camera = camera
         self._frequencies = np.asarray(probe.frequencies)
         self.mesh = mesh.placed(s.size_mm, s.position_mm, s.yaw_deg)
-        reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
-        self.transfer = precompute_transfer(self.mesh, reconstruction, s.directions, s.shadow_texels, progress)
-        self._gloss_rows = gloss_rows(reconstruction, s.roughness)
-        self._renderer: ObjectRenderer | None = None
+        self._reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
+        self.transfer = precompute_transfer(self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress)
+        self._opened: ObjectDrawer | None = None
 
     def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
         """The frame with the lit object in it.
@@ -119,45 +134,44 @@ class Relighter:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
         packed = self._packed(lighting)
         ratio = self.transfer.shadow.ratio(packed)
-        seen = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
-        box = seen.region()
-        region = union(box, self._shadow_region(camera_from_probe, ratio))
+        view = self._view(camera_from_probe)
+        region = union(None if view is None else view.region, self._shadow_region(camera_from_probe, ratio))
         if region is None:
             return frame
         linear = frame.linear_rgb(region)
         shade_plane(linear, region, self._camera, camera_from_probe, self.transfer.shadow.grid, ratio)
-        if box is not None:
-            drawn = self._draw(seen, box, camera_from_probe, packed)
-            cover(linear, box.x0 - region.x0, box.y0 - region.y0, drawn)
+        if view is not None:
+            drawn = self._drawer().draw(view, packed)
+            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, drawn)
         return frame.with_linear_rgb(region, linear)
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
-        seen = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
-        box = seen.region()
-        return None if box is None else (box, self._draw(seen, box, camera_from_probe, self._packed(lighting)))
+        view = self._view(camera_from_probe)
+        return None if view is None else (view.region, self._drawer().draw(view, self._packed(lighting)))
 
     def release(self) -> None:
         """Close the OpenGL context, from the thread that renders; it is opened again when needed."""
-        if self._renderer is not None:
-            self._renderer.release()
-            self._renderer = None
+        if self._opened is not None:
+            self._opened.release()
+            self._opened = None
 
-    def _draw(
-        self, seen: Projected, box: Region, camera_from_probe: Pose, packed: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
-        if self._renderer is None:
+    def _view(self, camera_from_probe: Pose) -> View | None:
+        projected = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        region = projected.region()
+        return None if region is None else View(camera_from_probe, projected, region)
+
+    def _drawer(self) -> ObjectDrawer:
+        if self._opened is None:
             s = self.settings
-            self._renderer = ObjectRenderer(
-                self.mesh, self.transfer.openness, s.roughness, s.normal_reflectance, s.supersampling
-            )
-        return self._renderer.draw(
-            seen.clip_coordinates(box),
-            self.transfer.vertex_rows @ packed,
-            self._gloss_rows @ packed,
-            camera_from_probe.camera_centre_mm,
-            box.size,
-        )
+            if s.renderer == "pyrender":
+                self._opened = PyrenderDrawer(self.mesh, self._reconstruction, self._camera, s.roughness)
+            else:
+                rows = gloss_rows(self._reconstruction, s.roughness)
+                self._opened = ObjectRenderer(
+                    self.mesh, self.transfer, rows, s.roughness, s.normal_reflectance, s.supersampling
+                )
+        return self._opened
 
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
         if not np.array_equal(lighting.frequencies, self._frequencies):

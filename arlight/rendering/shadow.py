@@ -75,7 +75,7 @@ class PlaneShadow:
         usable = open_plane > 0.0
         hidden = (self.hidden_rows @ light) / np.where(usable, open_plane, 1.0)
         # the reconstructed radiance may dip below 0 somewhere, which would brighten the plane
-        ratio = np.clip(1.0 - np.where(usable, hidden, 0.0), 0.0, 1.0)
+        ratio: Rows = np.clip(np.float32(1.0) - np.where(usable, hidden, np.float32(0.0)), 0.0, 1.0)
         return ratio.reshape(self.grid.side, self.grid.side, -1)
 
     def openness_along(self, points_mm: Array, direction: Array) -> Rows:

@@ -4,8 +4,9 @@ One parallel depth map per direction costs milliseconds for thousands of triangl
 ray caster without native code would cost as much per few hundred points.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+import moderngl
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -38,29 +39,38 @@ def visibility(mesh: Mesh, points_mm: Array, directions: Array, progress: Progre
     centre, radius = mesh.bounding_sphere_mm
     points = np.ascontiguousarray(points_mm - centre, np.float32)
     seen = np.empty((len(directions), len(points)), np.uint8)
-    with create_context() as context:
-        program = context.program(
-            vertex_shader=shader_source("depth.vert"), fragment_shader=shader_source("depth.frag")
-        )
-        depth = context.depth_texture((_MAP_SIZE, _MAP_SIZE))
-        target = context.framebuffer(depth_attachment=depth)
-        positions = context.buffer(np.ascontiguousarray(mesh.vertices_mm - centre, np.float32))
-        indices = context.buffer(np.ascontiguousarray(mesh.faces, np.int32))
-        triangles = context.vertex_array(program, [(positions, "3f", "position")], indices)
-        context.enable_only(context.DEPTH_TEST)
-        target.use()
-        for i, direction in enumerate(directions):
-            basis = _basis(direction) / radius
-            clip = np.diag([0.0, 0.0, 0.0, 1.0])
-            clip[:3, :3] = basis * [[1.0], [1.0], [-1.0]]
-            program["clip_from_probe"].write(clip.T.astype(np.float32).tobytes())
-            target.clear(depth=1.0)
-            triangles.render()
-            nearest = np.frombuffer(depth.read(), np.float32).reshape(_MAP_SIZE, _MAP_SIZE)
-            _look_up(nearest, basis.astype(np.float32), points, seen[i])
-            if progress is not None:
-                progress((i + 1) / len(directions))
+    context = create_context()
+    try:
+        with context:
+            maps = _depth_maps(context, mesh.vertices_mm - centre, mesh.faces, [_basis(d) / radius for d in directions])
+            for i, (basis, nearest) in enumerate(maps):
+                _look_up(nearest, basis.astype(np.float32), points, seen[i])
+                if progress is not None:
+                    progress((i + 1) / len(directions))
+    finally:
+        context.release()
     return seen
+
+
+def _depth_maps(
+    context: moderngl.Context, vertices: Array, faces: NDArray[np.int32], bases: list[Array]
+) -> Iterator[tuple[Array, NDArray[np.float32]]]:
+    """For each basis, across and along the light in units of the radius, the depth nearest to the light per texel."""
+    program = context.program(vertex_shader=shader_source("depth.vert"), fragment_shader=shader_source("depth.frag"))
+    depth = context.depth_texture((_MAP_SIZE, _MAP_SIZE))
+    target = context.framebuffer(depth_attachment=depth)
+    positions = context.buffer(np.ascontiguousarray(vertices, np.float32))
+    indices = context.buffer(np.ascontiguousarray(faces, np.int32))
+    triangles = context.vertex_array(program, [(positions, "3f", "position")], indices)
+    context.enable_only(context.DEPTH_TEST)
+    target.use()
+    for basis in bases:
+        clip = np.eye(4)
+        clip[:3, :3] = basis * [[1.0], [1.0], [-1.0]]
+        program["clip_from_probe"] = tuple(clip.T.reshape(-1).tolist())
+        target.clear(depth=1.0)
+        triangles.render()
+        yield basis, np.frombuffer(depth.read(), np.float32).reshape(_MAP_SIZE, _MAP_SIZE)
 
 
 def surface_offset_mm(mesh: Mesh) -> float:
