@@ -1,6 +1,6 @@
 """Frames of a moving camera over a lit sheet, with their truth."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ class SyntheticFrame:
 
 def synthesize(
     settings: SynthesisSettings, probe: Probe, layers: SheetLayers | None = None
-) -> Iterator[SyntheticFrame]:
+) -> Generator[SyntheticFrame]:
     """Film a sheet.
 
     1. The light's keys become irradiance of the paper, by FFT, when they are first needed.

@@ -76,7 +76,7 @@ def face_reflectance(cosine):
 
 
 def refracted_step(direction):
-    """How far to the side a ray toward `direction` (..., 3) moves within the glass, by the vector form of Snell's law."""
+    """How far to the side a ray toward `direction` (..., 3) moves within the glass, Snell in vectors."""
     normal = np.array([0.0, 0.0, 1.0])
     cosine = direction[..., 2:]
     inside = direction / INDEX + normal * (np.sqrt(1 - (1 - cosine**2) / INDEX**2) - cosine / INDEX)
@@ -157,8 +157,8 @@ def test_lamp_is_mirrored_where_geometry_says():
 def test_cross_fade_is_the_mixture_of_both_lights():
     pose = MOTION.pose(0.0, CAMERA, (SHEET_MM, SHEET_MM))
     first, second = smooth_light(2), smooth_light(3, peak=3.0).rotated(1.0)
-    mixed = drawn(first, pose, second=second, share=0.3, bounces=2)
-    parts = 0.7 * drawn(first, pose, bounces=2) + 0.3 * drawn(second, pose, bounces=2)
+    mixed = drawn(first, pose, second=second, share=0.3)
+    parts = 0.7 * drawn(first, pose) + 0.3 * drawn(second, pose)
     np.testing.assert_allclose(mixed, parts, atol=2e-5 * parts.max())
 
 

@@ -51,7 +51,7 @@ def brute_force(environment, film_at, points):
     """Sum over the map's pixels of light that refracts down to each point; vector form of Snell's law."""
     directions, radiance = environment.samples()
     total = np.zeros((len(points), 3))
-    for w, l in zip(directions, radiance, strict=True):
+    for w, incoming in zip(directions, radiance, strict=True):
         down = -w / 1.52
         inside = down + np.array([0, 0, 1.0]) * (w[2] / 1.52 - np.sqrt(1 - (1 - w[2] ** 2) / 1.52**2))
         crossing = points + 2.44 * inside[:2] / inside[2]
@@ -59,7 +59,7 @@ def brute_force(environment, film_at, points):
         s = np.sin(angle_in - angle_out) / np.sin(angle_in + angle_out)
         p = np.tan(angle_in - angle_out) / np.tan(angle_in + angle_out)
         face = (s**2 + p**2) / 2
-        total += np.outer(film_at(crossing[:, 0], crossing[:, 1]), l * w[2] * (1 - face) / (1 + face))
+        total += np.outer(film_at(crossing[:, 0], crossing[:, 1]), incoming * w[2] * (1 - face) / (1 + face))
     return total
 
 
