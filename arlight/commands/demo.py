@@ -9,7 +9,7 @@ import tyro
 
 from arlight.commands.encoding import EncodingOptions
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
-from arlight.commands.loop import Sinks, run_frames
+from arlight.commands.loop import Sinks, Work, run_frames
 from arlight.commands.options import File, OptionalFile
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.commands.relighting import RelightingOptions, make_relighter
@@ -26,7 +26,7 @@ from arlight.synthetic.motion import PathName
 from arlight.synthetic.settings import SynthesisSettings
 from arlight.synthetic.synthesis import synthesize
 from arlight.video.frame import Frame
-from arlight.video.writer import VideoWriter
+from arlight.video.writer import VideoWriter, check_output
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,10 @@ def run(options: DemoOptions) -> int:
     Raises:
         ArlightError: something the user can mend, in the environment, the object or an output.
     """
+    check_output(options.output, [])
     outputs = prepare_outputs(
-        {"--output": options.output, "--lighting": options.lighting}, [options.relighting.object, Path(options.environment)]
+        {"--output": options.output, "--lighting": options.lighting},
+        [options.relighting.object, Path(options.environment)],
     )
     settings = SynthesisSettings(
         environment=options.environment, light=options.light, path=options.path, duration_s=options.seconds
@@ -93,14 +95,14 @@ def _process(
     with Sinks() as sinks:
         sinks.video = VideoWriter(
             outputs["--output"].growing,
-            settings.filming_camera.image_size,
-            settings.frame_rate,
+            frame_rate=settings.frame_rate,
             crf=options.encoding.crf,
             preset=options.encoding.preset,
         )
         if "--lighting" in outputs:
             sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)
-        return run_frames(_frames(settings, probe), pipeline, sinks, statistics, "demo", settings.frame_count)
+        work = Work("demo", settings.frame_count, source="synthesise")
+        return run_frames(_frames(settings, probe), pipeline, sinks, statistics, work)
 
 
 def _frames(settings: SynthesisSettings, probe: Probe) -> Iterator[Frame]:

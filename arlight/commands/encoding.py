@@ -12,5 +12,5 @@ class EncodingOptions:
 
     crf: int = 18
     """Quality, 0 (lossless) to 51; lower is better and larger."""
-    preset: Preset = "veryfast"
+    preset: Preset = "ultrafast"
     """Time spent on compression: slower presets make smaller files."""

@@ -65,9 +65,7 @@ def open_footage(clip: Path, options: FootageOptions) -> Footage:
     try:
         probe_path = options.probe or find_sidecar(clip, "probe")
         if probe_path is None:
-            raise ProbeError(
-                f"{clip}: no probe.json beside it; give the one that `arlight probe` wrote with your sheet: --probe FILE"
-            )
+            raise ProbeError(f"{clip}: no probe.json beside it; give the one that `arlight probe` wrote: --probe FILE")
         camera_path = options.camera or find_sidecar(clip, "camera")
         if camera_path is None:
             raise CameraError(
@@ -97,8 +95,8 @@ def check_result(footage: Footage, statistics: RunStatistics) -> None:
         raise _absence(footage)
     if footage.reader.damage is not None:
         raise VideoError(
-            f"{footage.reader.path}: {footage.reader.damage}; the frames that can be read were used: copy or convert it "
-            "again for the rest"
+            f"{footage.reader.path}: {footage.reader.damage}; the frames that can be read were used: "
+            "copy or convert it again for the rest"
         )
 
 
@@ -110,8 +108,8 @@ def _absence(footage: Footage) -> ArlightError:
     for dictionary, ids in found.items():
         if own & set(ids) and same_family(dictionary, footage.probe.dictionary):
             return ProbeError(
-                f"{clip}: markers {ids_text(ids)} of {dictionary} are in the picture, but not where {probe_path} has them; "
-                "give the probe.json of the sheet that was filmed (--probe FILE), and check camera.json"
+                f"{clip}: markers {ids_text(ids)} of {dictionary} are in the picture, but not where {probe_path} "
+                "has them; give the probe.json of the sheet that was filmed (--probe FILE), and check camera.json"
             )
     if found:
         seen = "; ".join(f"{dictionary} {ids_text(ids)}" for dictionary, ids in found.items())

@@ -1,6 +1,7 @@
 """Frames through the pipeline into the outputs, with progress, until they end or Ctrl-C."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from time import perf_counter
 from types import TracebackType
@@ -9,8 +10,9 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
+from arlight.commands.background import InOrder, prefetched
 from arlight.commands.interruption import Interruption
-from arlight.pipeline import Pipeline
+from arlight.pipeline import FrameResult, Pipeline
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogRecord
 from arlight.results.report import ReportRecorder
@@ -26,6 +28,18 @@ class FrameSink(Protocol):
 
     def close(self) -> None:
         """Finish the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What a loop is about."""
+
+    title: str
+    """Name in the progress line."""
+    frames: int | None
+    """Frames to expect; None where that is not known."""
+    source: str = "decode"
+    """Name of the stage that the frames come from."""
 
 
 @dataclass(slots=True)
@@ -53,34 +67,42 @@ class Sinks:
 
 
 def run_frames(
-    frames: Iterable[Frame], pipeline: Pipeline, sinks: Sinks, statistics: RunStatistics, title: str, count: int | None
+    frames: Iterable[Frame], pipeline: Pipeline, sinks: Sinks, statistics: RunStatistics, work: Work
 ) -> bool:
     """The loop: decode, process, encode, log; Ctrl-C ends it after the frame in hand.
+
+    Frames come from one thread, are processed in the caller's, and go into the sinks from a third.
 
     Args:
         frames: in order.
         pipeline: what is done with each.
         sinks: where the results go.
         statistics: counts the frames; up to date after each, whatever ends the loop.
-        title: names the work in the progress line.
-        count: frames to expect; None where that is not known.
+        work: what the progress line shows.
 
     Returns:
         Whether it was interrupted.
     """
-    with Interruption() as interruption, FrameProgress(title, count) as progress:
-        for frame, decode_s in _timed(frames):
-            record = _process(frame, decode_s, pipeline, sinks)
-            statistics.add(record)
-            progress.advance(statistics)
+
+    def finish(processed: tuple[FrameResult, float]) -> None:
+        statistics.add(_write(*processed, work.source, sinks))
+        progress.advance(statistics)
+
+    with (
+        Interruption() as interruption,
+        FrameProgress(work) as progress,
+        InOrder(finish) as results,
+        closing(prefetched(frames)) as source,
+    ):
+        for frame, source_s in source:
+            results.put((pipeline.process(frame), source_s))
             if interruption.requested:
                 break
     return interruption.requested
 
 
-def _process(frame: Frame, decode_s: float, pipeline: Pipeline, sinks: Sinks) -> LogRecord:
-    result = pipeline.process(frame)
-    timings = {"decode": decode_s, **result.timings_s}
+def _write(result: FrameResult, source_s: float, source: str, sinks: Sinks) -> LogRecord:
+    timings = {source: source_s, **result.timings_s}
     if sinks.video is not None:
         started = perf_counter()
         sinks.video.write(result.composite)
@@ -96,13 +118,8 @@ def _process(frame: Frame, decode_s: float, pipeline: Pipeline, sinks: Sinks) ->
 class FrameProgress:
     """A progress line with frames per second and the share tracked, on standard error."""
 
-    def __init__(self, title: str, frame_count: int | None) -> None:
-        """Prepare the line.
-
-        Args:
-            title: what is being done.
-            frame_count: frames to expect; None where that is not known.
-        """
+    def __init__(self, work: Work) -> None:
+        """Prepare the line."""
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -113,7 +130,7 @@ class FrameProgress:
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._progress.add_task(title, total=frame_count, rate="")
+        self._task = self._progress.add_task(work.title, total=work.frames, rate="")
 
     def __enter__(self) -> "FrameProgress":
         self._progress.start()
@@ -126,14 +143,3 @@ class FrameProgress:
         """Show the state after one more frame."""
         rate = f"{statistics.frames_per_second:.1f} frames/s, {100.0 * statistics.tracked_share:.0f} % tracked"
         self._progress.update(self._task, completed=statistics.frames, rate=rate)
-
-
-def _timed(frames: Iterable[Frame]) -> Iterator[tuple[Frame, float]]:
-    """Each frame with the seconds it took to come."""
-    iterator = iter(frames)
-    while True:
-        started = perf_counter()
-        frame = next(iterator, None)
-        if frame is None:
-            return
-        yield frame, perf_counter() - started

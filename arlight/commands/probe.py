@@ -17,8 +17,8 @@ from arlight.probe.pages import Paper
 class ProbeOptions:
     """Design a sheet and write what is needed to print and use it.
 
-    The folder gets probe.json (which `arlight run` needs), top.pdf, bottom.pdf and frame.pdf to print at 100 %, guide.pdf
-    on how to put them together, the same layers as PNG rasters, and preview.png.
+    The folder gets probe.json (which `arlight run` needs), top.pdf, bottom.pdf and frame.pdf to print at 100 %,
+    guide.pdf on how to put them together, the same layers as PNG rasters, and preview.png.
     """
 
     output: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("probe")

@@ -8,7 +8,7 @@ import tyro
 from arlight.commands.encoding import EncodingOptions
 from arlight.commands.footage import Footage, FootageOptions, check_result, open_footage
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
-from arlight.commands.loop import Sinks, run_frames
+from arlight.commands.loop import Sinks, Work, run_frames
 from arlight.commands.options import OptionalFile, PositionalFile
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.commands.relighting import RelightingOptions, make_relighter
@@ -19,7 +19,7 @@ from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.report import ReportRecorder
 from arlight.results.statistics import RunStatistics
-from arlight.video.writer import VideoWriter
+from arlight.video.writer import VideoWriter, check_output
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,8 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
         output = Path(f"{options.clip.stem}-relit.mp4")
     if not options.render and lighting is None:
         lighting = Path(f"{options.clip.stem}.jsonl")
+    if output is not None:
+        check_output(output, [])
     inputs = [options.clip, footage.probe_path, footage.camera_path, options.relighting.object]
     return prepare_outputs({"--output": output, "--lighting": lighting, "--report": options.report}, inputs)
 
@@ -94,13 +96,15 @@ def _process(
     with Sinks() as sinks:
         if "--output" in outputs:
             growing = outputs["--output"].growing
-            sinks.video = VideoWriter(growing, footage.reader, crf=options.encoding.crf, preset=options.encoding.preset)
+            sinks.video = VideoWriter(
+                growing, like=footage.reader, crf=options.encoding.crf, preset=options.encoding.preset
+            )
         if "--lighting" in outputs:
             sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)
         if "--report" in outputs:
             sinks.report = ReportRecorder(header)
         reader = footage.reader
-        interrupted = run_frames(reader, pipeline, sinks, statistics, options.clip.name, reader.frame_count)
+        interrupted = run_frames(reader, pipeline, sinks, statistics, Work(options.clip.name, reader.frame_count))
     if sinks.report is not None:
         sinks.report.write(outputs["--report"].growing, statistics)
     return interrupted
