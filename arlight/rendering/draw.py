@@ -48,17 +48,16 @@ class ObjectRenderer:
         self._context = create_context()
         # the viewport's rows run downward, which turns every triangle's winding round
         self._context.front_face = "cw"
+        textured = mesh.textures is not None
         self._program = self._context.program(
-            vertex_shader=shader_source("object.vert"), fragment_shader=shader_source("object.frag")
+            vertex_shader=_variant("object.vert", textured), fragment_shader=_variant("object.frag", textured)
         )
         self._set("roughness", roughness)
         self._set("normal_reflectance", normal_reflectance)
         self._set("gloss", 0)
-        self._set("base_texture", 1)
-        self._set("has_texture", mesh.textures is not None)
         self._gloss = self._context.texture((GLOSS_SIDE, GLOSS_SIDE), 3, dtype="f4")
         self._gloss.repeat_x = self._gloss.repeat_y = False
-        self._textures = self._upload_textures(mesh)
+        self._textures = self._upload_textures(mesh.textures) if mesh.textures is not None else None
         self._clip = self._context.buffer(reserve=16 * len(mesh.vertices_mm), dynamic=True)
         self._diffuse = self._context.buffer(reserve=12 * len(mesh.vertices_mm), dynamic=True)
         self._triangles = self._context.vertex_array(
@@ -68,14 +67,9 @@ class ObjectRenderer:
                 (self._diffuse, "3f", "diffuse_radiance"),
                 (
                     self._context.buffer(_static_attributes(mesh, transfer.openness)),
-                    "3f 3f 3f 3f 3f 3f 3f",
-                    "position_mm",
-                    "normal",
-                    "base_colour",
-                    "texture_place",
-                    "openness_0",
-                    "openness_1",
-                    "openness_2",
+                    "3f 3f 3f 3f 3f 3f" + textured * " 3f",
+                    *("position_mm", "normal", "base_colour", "openness_0", "openness_1", "openness_2"),
+                    *(("texture_place",) if textured else ()),
                 ),
             ],
             self._context.buffer(np.ascontiguousarray(mesh.faces, np.int32)),
@@ -111,7 +105,8 @@ class ObjectRenderer:
             self._context.enable_only(moderngl.DEPTH_TEST | (moderngl.CULL_FACE if self._closed else 0))
             target.clear(viewport=(0, 0, width, height))
             self._gloss.use(0)
-            self._textures.use(1)
+            if self._textures is not None:
+                self._textures.use(1)
             self._triangles.render()
             pixels = np.frombuffer(target.read((0, 0, width, height), 4, dtype="f4"), np.float32)
         # over a whole number of samples this is their plain mean
@@ -136,9 +131,8 @@ class ObjectRenderer:
             return self._target
         return held
 
-    def _upload_textures(self, mesh: Mesh) -> moderngl.TextureArray:
-        # two samplers of different kinds may not share a unit, so an object without textures gets a blank one
-        images = np.full((1, 1, 1, 3), 255, np.uint8) if mesh.textures is None else mesh.textures
+    def _upload_textures(self, images: NDArray[np.uint8]) -> moderngl.TextureArray:
+        self._set("base_texture", 1)
         layers, height, width = images.shape[:3]
         # row 0 of an OpenGL texture is v = 0, its bottom
         data = np.ascontiguousarray(images[:, ::-1])
@@ -147,9 +141,14 @@ class ObjectRenderer:
         return textures
 
 
+def _variant(name: str, textured: bool) -> str:
+    """The shader, compiled with or without its textured part: the test alone would cost a sixth of the drawing."""
+    source = shader_source(name)
+    return source.replace("#version 330\n", "#version 330\n#define TEXTURED\n", 1) if textured else source
+
+
 def _static_attributes(mesh: Mesh, openness: NDArray[np.float32]) -> NDArray[np.float32]:
-    place = np.zeros((len(mesh.vertices_mm), 3), np.float32)
+    columns = [mesh.vertices_mm, mesh.normals, mesh.base_colour, openness]
     if mesh.uv is not None and mesh.layer is not None:
-        place[:, :2], place[:, 2] = mesh.uv, mesh.layer
-    columns = [np.asarray(c, np.float32) for c in (mesh.vertices_mm, mesh.normals, mesh.base_colour, place, openness)]
-    return np.concatenate(columns, axis=1)
+        columns += [mesh.uv, mesh.layer[:, None]]
+    return np.concatenate([np.asarray(c, np.float32) for c in columns], axis=1)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
@@ -21,8 +21,8 @@ from arlight.rendering.transfer import precompute_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
 
-_DARKENING = 0.004
-"""A shadow that takes less than this share of the light is below half an 8-bit level and is not drawn."""
+_DARKENING = 0.008
+"""A shadow that takes less than this share of the light is below one 8-bit level, and pixels of less are left alone."""
 
 
 RendererName = Literal["moderngl", "pyrender"]
@@ -181,9 +181,9 @@ class Relighter:
             )
         return pack_real(lighting.coefficients).astype(np.float32)
 
-    def _shadow_region(self, camera_from_probe: Pose, ratio: ArrayLike) -> Region | None:
+    def _shadow_region(self, camera_from_probe: Pose, ratio: NDArray[np.float32]) -> Region | None:
         """Pixels that see the darkened part of the plane."""
-        dark = np.min(ratio, axis=2) < 1.0 - _DARKENING
+        dark = np.any(ratio < 1.0 - _DARKENING, axis=2)
         rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
         if len(rows) == 0:
             return None
