@@ -20,6 +20,9 @@ _BLUR_RATE = 0.2
 _REMEMBERED_S = 1.0
 """How long after a loss the last pose is still worth a try [s]."""
 
+_TIE = 0.02
+"""Sums of the markers' correlations that differ by less are no reason to prefer one pose."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Sighting:
@@ -46,6 +49,7 @@ class PoseTracker:
         self._detector = FiducialDetector(probe)
         self._alignment = FiducialAlignment(probe, camera)
         self._srgb = linear_from_encoded(np.arange(256) / 255.0, "srgb")
+        self._load_compiled_code()
         self.reset()
 
     def reset(self) -> None:
@@ -72,7 +76,8 @@ class PoseTracker:
             CameraError: the frame's size is not the camera's.
         """
         self._check_size(luma)
-        table = self._srgb if linear_table is None else np.ascontiguousarray(linear_table, np.float32)
+        # A copy, because a read-only array is another type to the compiler.
+        table = self._srgb if linear_table is None else np.array(linear_table, np.float32)
         found = self._follow(luma, time_s, table) or self._acquire(luma, table)
         if found is None:
             self._misses += 1
@@ -86,6 +91,11 @@ class PoseTracker:
             self._blur_px += _BLUR_RATE * (found.blur_px - self._blur_px)
         blur = float(np.sqrt(max(self._blur_px**2 - SAMPLING_VARIANCE_PX2, 0.0)))
         return ProbePose(found.pose, found.residual_rms_px, "tracked", blur, int(np.count_nonzero(found.used)))
+
+    def _load_compiled_code(self) -> None:
+        """Compile, or load from the cache, before the first frame rather than in it."""
+        blank = Picture(np.zeros((16, 16), np.uint8), self._srgb, (0, 0))
+        self._alignment.align(blank, Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 1e3])), _TYPICAL_BLUR_PX, 1)
 
     def _check_size(self, luma: NDArray[np.uint8]) -> None:
         width, height = self._camera.image_size
@@ -117,7 +127,7 @@ class PoseTracker:
         if region is None:
             return None
         x0, y0, x1, y1 = region
-        picture = Picture(np.ascontiguousarray(luma[y0:y1, x0:x1]), table, (x0, y0))
+        picture = Picture(np.array(luma[y0:y1, x0:x1], order="C"), table, (x0, y0))
         if self._blur_px is not None:
             return self._alignment.align(picture, start, self._blur_px, coarsest)
         found = self._alignment.align(picture, start, _TYPICAL_BLUR_PX, coarsest)
@@ -137,8 +147,17 @@ class PoseTracker:
                 if found is not None and found.accepted:
                     candidates.append(found)
             if candidates:
-                return max(candidates, key=lambda found: float(np.sum(found.correlation[found.used])))
+                return self._choose(candidates)
         return None
+
+    def _choose(self, candidates: list[Alignment]) -> Alignment:
+        """The candidate that fits best; of two that fit as well, the one that continues the last pose."""
+        fit = [float(np.sum(found.correlation[found.used])) for found in candidates]
+        close = [found for found, score in zip(candidates, fit, strict=True) if score > max(fit) - _TIE]
+        if self._last is None:
+            return candidates[int(np.argmax(fit))]
+        last = self._last.pose.rotation
+        return max(close, key=lambda found: float(np.trace(last.T @ found.pose.rotation)))
 
     def _scales(self) -> tuple[float, ...]:
         """Resolutions to search at: all at first and just after a loss, then one a frame, in turn."""

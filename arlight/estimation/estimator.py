@@ -1,0 +1,155 @@
+"""From block measurements to lighting: robust weighted least squares with the mirror reflection as a nuisance.
+
+Unknown for each channel are the coefficients and the reflection field. Green is solved first: it is nearly luma, the
+sharpest of the three, and the reflection in red and blue follows its pattern, for it is the same mirrored scene.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.estimation.channel_fit import ChannelFit, fit_channel
+from arlight.estimation.lighting import Lighting
+from arlight.estimation.normal_equations import BlockSystem
+from arlight.estimation.prior import color_stddev, prior_stddev
+from arlight.estimation.reflection import field_amplitude, reflection_basis
+from arlight.estimation.response import BlockResponse
+from arlight.fourier import unpack_real
+from arlight.probe.design import Probe
+from arlight.tracking.block_layout import field_blocks
+from arlight.tracking.block_means import BlockColors, BlockMeans
+
+Array = NDArray[np.float64]
+
+_GREEN = 1
+_FIELD_FLOOR = 1e-3
+"""Least standard deviation of the reflection field, relative to white."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Lighting of one frame, and what came with it."""
+
+    lighting: Lighting
+    """Coefficients with covariance."""
+    colors: BlockColors
+    """Colour line of each block, for measuring the next frame."""
+    reflection: Array
+    """(blocks, 3) mirror reflection in the film's upper face [full scale]."""
+    blur_variance_px2: float
+    """Variance of the picture's blur as the stripes show it [px^2]."""
+
+
+class LightingEstimator:
+    """Estimates lighting from a sheet's block measurements; what the view does not change is prepared once."""
+
+    def __init__(self, probe: Probe, *, bounces: bool = True) -> None:
+        """Prepare for a sheet; `bounces` as in `BlockResponse`."""
+        blocks = field_blocks(probe)
+        kinds = np.array([block.kind for block in blocks])
+        index = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
+        self._frequencies = probe.frequencies
+        self._slab = probe.slab
+        self._response = BlockResponse(probe, bounces=bounces)
+        self._patterned = kinds == "pattern"
+        self._white = kinds == "clear_white"
+        self._black_film = np.isin(kinds, ["black_white", "black_black"])
+        self._clear_black = kinds == "clear_black"
+        self._column = np.array([index[block.frequency] if block.frequency else 0 for block in blocks])
+        self._basis = reflection_basis(np.array([block.center_mm for block in blocks], float).reshape(-1, 2))
+        self._white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
+
+    def estimate(self, means: BlockMeans, time_s: float, blur_variance_px2: float = 0.4) -> Estimate:
+        """Lighting of one frame.
+
+        Args:
+            means: the frame's measurements.
+            time_s: the frame's time [s].
+            blur_variance_px2: where to start the search for the blur [px^2].
+
+        Returns:
+            The estimate. Blocks that were not seen add nothing; with none at all the covariance is the prior's.
+        """
+        rows = self._response.light(means)
+        white = self._white_level(means)
+        mirror = self._mirror_rows(means, white)
+        green = self._fit(means, rows, mirror, _GREEN, white, blur_variance_px2, None)
+        blur = green.blur_variance_px2
+        red, blue = (self._fit(means, rows, mirror, channel, white, blur, green) for channel in (0, 2))
+        fits = (red, green, blue)
+        lighting = Lighting(
+            self._frequencies,
+            unpack_real(np.stack([fit.packed for fit in fits], axis=1)),
+            np.stack([fit.covariance for fit in fits]),
+            time_s,
+            float(np.mean([fit.chi2 for fit in fits])),
+        )
+        reflection = np.stack([red.field, green.reflection, blue.field], axis=1)
+        return Estimate(lighting, _colors(fits, reflection, white), reflection, blur)
+
+    def _white_level(self, means: BlockMeans) -> Array:
+        """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""
+        white = means.values[self._white & means.valid, 0]
+        if len(white):
+            return np.maximum(np.median(white, axis=0), 1e-3)
+        patterned = means.values[self._patterned & means.valid, 0]
+        return np.maximum(8.0 * np.median(patterned, axis=0), 1e-3) if len(patterned) else np.full(3, 0.5)
+
+    def _mirror_rows(self, means: BlockMeans, white: Array) -> Array:
+        """Rows (blocks, 7) of the reflection where the upper face alone gives 1 in the mean.
+
+        How much the lower face adds under clear film is read off the two kinds of black region; the prior, one face
+        more, gives way where there is a reflection to look at.
+        """
+        lower = self._response.lower_mirror(means)
+        upper = np.zeros_like(lower)
+        upper[:, 0] = 1.0
+        black, clear = self._black_film & means.valid, self._clear_black & means.valid
+        if np.count_nonzero(black) < 3 or not np.any(clear):
+            return upper + lower
+        level = np.median(means.values[black, 0] / white, axis=0)
+        excess = np.median(means.values[clear, 0] / white, axis=0) - level
+        weight = (level / (2.0 * _FIELD_FLOOR)) ** 2
+        seen = excess / np.maximum(level, 1e-6) / float(np.median(lower[clear, 0]))
+        strength = (1.0 + np.sum(weight * seen)) / (1.0 + np.sum(weight))
+        return upper + np.clip(strength, 0.0, 1.2) * lower
+
+    def _fit(
+        self, means: BlockMeans, rows: Array, mirror: Array, channel: int, white: Array, blur: float,
+        green: ChannelFit | None,
+    ) -> ChannelFit:  # fmt: skip
+        level = float(white[channel])
+        fresnel = self._slab.interface_reflectance(means.view_cosine)
+        basis = self._basis * (fresnel / fresnel.mean())[:, None]
+        black = (self._black_film | self._clear_black) & means.valid
+        amplitude = field_amplitude(means.values[black, 0, channel] / mirror[black, 0], _FIELD_FLOOR * level)
+        deviation = np.full(basis.shape[1], amplitude)
+        deviation[0] = level
+        if green is not None:
+            shape = green.reflection / max(float(np.std(green.reflection)), 1e-6)
+            basis, deviation = np.column_stack([basis, shape]), np.append(deviation, level)
+        irradiance = level / self._white_per_irradiance
+        spread = prior_stddev(self._frequencies, irradiance)
+        expected = np.zeros_like(spread)
+        if green is not None:
+            spread = color_stddev(self._frequencies, irradiance)
+            expected = green.packed * (level / white[_GREEN])
+        system = BlockSystem(
+            self._column,
+            self._patterned,
+            basis,
+            np.concatenate([expected, np.zeros_like(deviation)]),
+            np.concatenate([spread, deviation]),
+        )
+        return fit_channel(means, channel, level, rows, mirror, system, blur)
+
+
+def _colors(fits: tuple[ChannelFit, ...], reflection: Array, white: Array) -> BlockColors:
+    """Each block's colour line: from its reflection along the regression of its stripes on green."""
+    swing = np.stack([fit.lit[:, 1:] for fit in fits], axis=-1)
+    green = swing[..., _GREEN : _GREEN + 1]
+    # where a block has next to no stripes its line has the colour of white
+    floor = (0.01 * white[_GREEN]) ** 2
+    slope = (np.sum(swing * green, axis=1) + floor * white / white[_GREEN]) / (np.sum(green**2, axis=1) + floor)
+    return BlockColors(np.maximum(reflection, 1e-5), np.maximum(slope, 1e-3))

@@ -1,0 +1,66 @@
+"""Weighted normal equations of blocks that share L_0 and a reflection field but have a frequency of their own.
+
+Row r of block i reads  d_r0 L_0 + d_r1 Re L_n(i) + d_r2 Im L_n(i) + mirror_r * (basis_i . w): of the unknown
+(L_0, Re L_1, ..., w) it touches three coefficients and the field, so nothing of full width is ever multiplied.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class BlockSystem:
+    """Gathers and solves the equations of one channel."""
+
+    def __init__(
+        self, column: NDArray[np.int64], patterned: NDArray[np.bool_], basis: Array, expected: Array, deviation: Array
+    ) -> None:
+        """Fix what does not change while weights are iterated.
+
+        Args:
+            column: (blocks,) index of the block's frequency in the list of coefficients.
+            patterned: (blocks,) False for blocks that only see L_0.
+            basis: (blocks, s) of the reflection field.
+            expected: (c + s,) prior mean of all unknown; deviation: (c + s,) its standard deviation.
+        """
+        self._basis = basis
+        self._prior = 1.0 / deviation**2
+        self._expected = expected
+        self._coefficients = len(deviation) - basis.shape[1]
+        self.field_size = basis.shape[1]
+        real = np.where(patterned, 2 * column - 1, 0)
+        self._places = np.stack([np.zeros_like(column), real, np.where(patterned, real + 1, 0)], axis=1)
+
+    def solve(self, design: Array, mirror: Array, values: Array, precision: Array) -> tuple[Array, Array]:
+        """Solution (c + s,) and normal matrix (c + s, c + s) including the prior.
+
+        Args:
+            design: (blocks, rows, 3); mirror, values, precision: (blocks, rows).
+        """
+        c, places, basis = self._coefficients, self._places, self._basis
+        weighted = design * precision[..., None]
+        own = np.einsum("brk,brl->bkl", weighted, design)
+        shared = np.einsum("brk,br->bk", weighted, mirror)
+        field = np.einsum("br,br,br->b", mirror, mirror, precision)
+        normal = np.zeros((len(self._prior), len(self._prior)))
+        np.add.at(normal, (places[:, :, None], places[:, None, :]), own)
+        cross = np.zeros((c, basis.shape[1]))
+        np.add.at(cross, places.ravel(), (shared[:, :, None] * basis[:, None, :]).reshape(-1, basis.shape[1]))
+        normal[:c, c:] = cross
+        normal[c:, :c] = cross.T
+        normal[c:, c:] = (basis * field[:, None]).T @ basis
+        right = np.zeros(len(self._prior))
+        np.add.at(right, places, np.einsum("brk,br->bk", weighted, values))
+        right[c:] = np.einsum("br,br,br->b", mirror, values, precision) @ basis
+        normal[np.diag_indices_from(normal)] += self._prior
+        right += self._prior * self._expected
+        return np.linalg.solve(normal, right), normal
+
+    def field(self, solution: Array) -> Array:
+        """Reflection field (blocks,) of a solution."""
+        return self._basis @ solution[self._coefficients :]
+
+    def lit(self, solution: Array, design: Array) -> Array:
+        """Rows (blocks, rows) that the lighting alone predicts."""
+        return np.einsum("brk,bk->br", design, solution[self._places])

@@ -1,0 +1,34 @@
+"""The mirror reflection in the film, as a smooth random field over the sheet.
+
+The film mirrors the environment, and neighbouring blocks mirror neighbouring directions. The field's prior is a
+Matern-3/2 process over the sheet, written in its leading eigenvectors, so that a few numbers a channel describe it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LENGTH_MM = 40.0
+"""Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
+_KEPT_VARIANCE = 1e-3
+
+
+def reflection_basis(centers_mm: Array) -> Array:
+    """Basis (blocks, k): a constant, then fields whose amplitudes are independent with unit variance.
+
+    Args:
+        centers_mm: (blocks, 2) centres of the blocks [mm].
+    """
+    distance = np.linalg.norm(centers_mm[:, None] - centers_mm[None], axis=-1)
+    scaled = np.sqrt(3.0) * distance / _LENGTH_MM
+    values, vectors = np.linalg.eigh((1.0 + scaled) * np.exp(-scaled))
+    kept = values > _KEPT_VARIANCE * values[-1]
+    return np.concatenate([np.ones((len(centers_mm), 1)), vectors[:, kept] * np.sqrt(values[kept])], axis=1)
+
+
+def field_amplitude(observed: Array, floor: float) -> float:
+    """Standard deviation of the field, robust to a lamp mirrored in one of the black regions."""
+    if len(observed) < 3:
+        return 10.0 * floor
+    return float(max(1.5 * np.median(np.abs(observed - np.median(observed))), floor))

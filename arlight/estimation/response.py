@@ -1,0 +1,91 @@
+"""A(view): what each block's mean and stripe harmonics are for unit coefficients, from one point of view.
+
+A pixel whose film point has the phase phi sees paper of phase phi - b, b = 2 pi n.Delta(v). With film harmonics f_a and
+radiosity harmonics B_l its radiance is T(v)/pi * sum f_a B_l exp(i (a + l) phi) exp(-i l b): harmonic m collects all
+a + l = m (paper, eqs 12-19, with real layers). Rows are real: mean, cosine 1, sine 1, ... of the film's phase.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.estimation.stack import HARMONICS as STACK_HARMONICS
+from arlight.estimation.stack import paper_light
+from arlight.probe.design import Probe
+from arlight.tracking.block_layout import field_blocks
+from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+class BlockResponse:
+    """The response of a sheet's blocks; everything that does not depend on the view is computed once."""
+
+    def __init__(self, probe: Probe, *, bounces: bool = True) -> None:
+        """Solve the stack of every block.
+
+        Args:
+            probe: the sheet.
+            bounces: follow the light reflected between paper and glass.
+        """
+        blocks = field_blocks(probe)
+        light = paper_light(probe, blocks, bounces=bounces)
+        self._slab = probe.slab
+        # (blocks, m, l, 3): film harmonic m - l times radiosity harmonic l
+        self._paths = _toeplitz(light.film)[..., None] * light.radiosity[:, None]
+        # the lower face mirrors through the film twice, 2 D(v) apart: film harmonics m - l and l, turned by 2 l b
+        self._mirror = _toeplitz(light.film) * light.film[:, None]
+        self._clear = float(probe.film_transmittance)
+
+    def light(self, means: BlockMeans) -> Array:
+        """Rows (blocks, 7, 3) for unit L_0, Re L_n and Im L_n of each block's own frequency, before blur."""
+        turn = view_powers(means.view_phasor, 1)
+        series = np.einsum("bmlk,bl->bmk", self._paths, turn)
+        return _real_rows(series) * (self._slab.transmittance(means.view_cosine) / np.pi)[:, None, None]
+
+    def lower_mirror(self, means: BlockMeans) -> Array:
+        """Rows (blocks, 7) of the mirror reflection in the glass's lower face, where the upper face's is 1."""
+        turn = view_powers(means.view_phasor, 2)
+        series = np.einsum("bml,bl->bm", self._mirror, turn)
+        passed = (1.0 - self._slab.interface_reflectance(means.view_cosine)) ** 2
+        return _real_rows(series[..., None])[..., 0] * passed[:, None]
+
+
+def view_powers(phasor: ComplexArray, step: int) -> ComplexArray:
+    """Means of exp(-i step l b) for l = -H..H, from the mean phasor of b over a block.
+
+    The spread of b over a block is small and nearly uniform, so its characteristic function falls as that of any narrow
+    distribution: |mean exp(-i k b)| = |mean exp(-i b)|^(k^2).
+    """
+    power = step * np.arange(-STACK_HARMONICS, STACK_HARMONICS + 1)
+    length = np.maximum(np.abs(phasor), 1e-6)
+    return length[:, None] ** (power**2) * np.exp(1j * np.outer(np.angle(phasor), power))
+
+
+def optical_transfer(cycles_per_px: Array, blur_variance_px2: float) -> Array:
+    """What pixel and blur leave of each row (blocks, 7): 1 for the mean, the transfer at m n for harmonic m.
+
+    Args:
+        cycles_per_px: (blocks, 2) frequency of the stripes in the image [1/px].
+        blur_variance_px2: variance of a Gaussian blur beside the pixel's square [px^2].
+    """
+    harmonic = np.concatenate([[0], np.repeat(np.arange(1, HARMONICS + 1), 2)])
+    frequency = harmonic[:, None] * cycles_per_px[:, None, :]
+    square = np.prod(np.sinc(frequency), axis=-1)
+    return square * np.exp(-2.0 * np.pi**2 * blur_variance_px2 * np.sum(frequency**2, axis=-1))
+
+
+def _toeplitz(film: ComplexArray) -> ComplexArray:
+    """(blocks, m, l): film harmonic m - l for m = 0..3, l = -H..H."""
+    size = film.shape[1]
+    index = np.subtract.outer(np.arange(HARMONICS + 1), np.arange(size)) + 2 * STACK_HARMONICS
+    return np.where((index >= 0) & (index < size), film[:, np.clip(index, 0, size - 1)], 0.0)
+
+
+def _real_rows(series: ComplexArray) -> Array:
+    """Mean, cosine and sine rows (blocks, 7, k) of harmonics (blocks, 4, k) of a real function."""
+    rows = np.empty((series.shape[0], ROWS, series.shape[2]))
+    rows[:, 0] = series[:, 0].real
+    rows[:, 1::2] = 2.0 * series[:, 1:].real
+    rows[:, 2::2] = -2.0 * series[:, 1:].imag
+    return rows

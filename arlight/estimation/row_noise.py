@@ -1,0 +1,40 @@
+"""How far a block's rows may stray from the model: noise of the pixels, and what the model leaves out."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.tracking.block_means import BlockMeans
+
+Array = NDArray[np.float64]
+
+_FLOOR = 0.002
+"""Least standard deviation of a pixel, relative to white: quantisation to 8 bits."""
+_CORRELATION = 2.0
+"""Pixels that codecs and demosaicing make alike count once."""
+_MEAN_MODEL = 0.0012
+"""Standard deviation of the model's error in a mean, relative to white."""
+_SWING_MODEL = 0.001
+"""The same in a harmonic."""
+_BLUR_MODEL = 0.005
+"""And in a harmonic that blur has all but removed."""
+_COLOR_SPREAD = 0.2
+"""How much the stripes' colour differs between blocks: error of a harmonic that was inferred from luma."""
+
+
+def row_variance(means: BlockMeans, channel: int, white: float, transfer: Array) -> Array:
+    """Variance (blocks, 7) of each row's error.
+
+    Args:
+        channel: 0, 1, 2 for red, green, blue.
+        white: radiance of clear film on white paper in that channel.
+        transfer: (blocks, 7) what blur leaves of each row.
+    """
+    pixel = np.maximum(means.pixel_variance[:, channel], (_FLOOR * white) ** 2)
+    variance = _CORRELATION * np.diagonal(means.covariance, axis1=1, axis2=2) * pixel[:, None]
+    variance[:, 0] += (_MEAN_MODEL * white) ** 2
+    variance[:, 1:] += (white * (_SWING_MODEL + _BLUR_MODEL * (1.0 - transfer[:, 1:]))) ** 2
+    if channel != 1:
+        inferred = _COLOR_SPREAD * (1.0 - means.color_trust)
+        swing = np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel])
+        variance[:, 1:] += (inferred[:, None] * np.repeat(swing, 2, axis=1)) ** 2
+    return variance

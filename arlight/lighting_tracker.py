@@ -1,0 +1,121 @@
+"""Frames in, pose and lighting out: the estimation half of the frame loop, without rendering."""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from arlight.camera import Camera
+from arlight.estimation.estimator import Estimate, LightingEstimator
+from arlight.estimation.filter import LightingFilter
+from arlight.estimation.lighting import Lighting
+from arlight.probe.design import Probe
+from arlight.tracking.blocks import BlockMeter
+from arlight.tracking.luma import luma_codes
+from arlight.tracking.pose import ProbePose
+from arlight.tracking.tracker import PoseTracker
+from arlight.video.frame import Frame
+
+_DEFAULT_BLUR_PX = 0.6
+_FIRST_PASSES = 3
+"""How often the first frame is measured until its colour lines have settled."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerSettings:
+    """Choices that trade speed for accuracy."""
+
+    samples_per_block: int = 1200
+    """Pixels a block is sampled with at most."""
+    filtered: bool = True
+    """Average over time; without it every frame stands alone."""
+    bounces: bool = True
+    """Model the light reflected between paper and glass; off only for sheets without it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameEstimate:
+    """What one frame told."""
+
+    index: int
+    """Number of the frame in its source."""
+    time_s: float
+    """Its time [s]."""
+    pose: ProbePose
+    """Where the sheet is; `coasting` when it is hidden and the lighting is carried on."""
+    lighting: Lighting | None
+    """Filtered lighting; None before the first estimate."""
+    raw: Lighting | None
+    """This frame's own estimate; None when the sheet was not seen."""
+    timings_s: dict[str, float] = field(default_factory=dict)
+    """Wall time of each stage [s]."""
+
+
+class LightingTracker:
+    """Follows the sheet and the light that falls on it.
+
+    Args:
+        probe: the sheet.
+        camera: intrinsics of the camera that filmed it.
+        settings: choices that trade speed for accuracy.
+
+    Raises:
+        ProbeError: the sheet's fiducials are unknown to ArUco.
+    """
+
+    def __init__(self, probe: Probe, camera: Camera, settings: TrackerSettings | None = None) -> None:
+        self._settings = settings or TrackerSettings()
+        self._tracker = PoseTracker(probe, camera)
+        self._meter = BlockMeter(probe, camera, self._settings.samples_per_block)
+        self._estimator = LightingEstimator(probe, bounces=self._settings.bounces)
+        self._filter = LightingFilter()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything about earlier frames."""
+        self._tracker.reset()
+        self._filter.reset()
+        self._last: Estimate | None = None
+
+    def update(self, frame: Frame) -> FrameEstimate:
+        """Pose and lighting of the next frame.
+
+        Raises:
+            CameraError: the frame's size is not the camera's.
+        """
+        # products this small run slower on several threads than on one
+        with threadpool_limits(limits=1, user_api="blas"):
+            return self._update(frame)
+
+    def _update(self, frame: Frame) -> FrameEstimate:
+        start = perf_counter()
+        codes, table = luma_codes(frame)
+        pose = self._tracker.update(codes, frame.time_s, table)
+        tracked = perf_counter()
+        raw, measured = self._estimate(frame, pose)
+        estimated = perf_counter()
+        lighting = self._filter.update(raw, frame.time_s) if self._settings.filtered else raw
+        timings = {
+            "track": tracked - start,
+            "measure": measured - tracked,
+            "estimate": estimated - measured,
+            "filter": perf_counter() - estimated,
+        }
+        if pose.camera_from_probe is None and lighting is not None:
+            pose = ProbePose(None, float("nan"), "coasting")
+        return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, timings)
+
+    def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Lighting | None, float]:
+        """The frame's own lighting, and when its blocks had been measured."""
+        if pose.camera_from_probe is None:
+            return None, perf_counter()
+        blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
+        for _ in range(1 if self._last else _FIRST_PASSES):
+            last = self._last
+            colors, blur = (last.colors, last.blur_variance_px2) if last else (None, blur_px**2)
+            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, colors)
+            measured = perf_counter()
+            self._last = self._estimator.estimate(means, frame.time_s, blur)
+        return self._last.lighting, measured

@@ -1,0 +1,244 @@
+"""Compiled loops over the pixels of the blocks; `blocks` says what they are for."""
+
+import numpy as np
+from numba import njit
+
+MAX_COLUMNS = 9
+"""Columns of a block's fit: 1, x, y and the cosine and sine of three harmonics."""
+
+
+@njit(cache=True)
+def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, plane_from_ray, camera_mm, glass_mm,
+           index_squared, stride, pixels, positions, phases, first, views):  # fmt: skip
+    """List the pixels whose film point and paper point both lie inside their block.
+
+    The paper point must keep `reach_mm` from the block's border, so that all light that reaches it came through the
+    block's own film; the film point must keep `margin_mm`, so that no neighbour is blurred into it.
+
+    Fills pixels (n,) with flat indices, positions (n, 2) in [-1, 1], phases (n,) of the film's pattern, first (b + 1,)
+    with the start of each block, views (b, 3) with sums of cos b, sin b and the view's cosine.
+    """
+    h, w = rays.shape[:2]
+    count = 0
+    capacity = pixels.shape[0]
+    g = plane_from_ray
+    for block in range(centers.shape[0]):
+        first[block] = count
+        cx, cy = centers[block]
+        paper_limit = half_mm[block] - reach_mm
+        fx, fy = cycles_per_mm[block]
+        sum_cos = 0.0
+        sum_sin = 0.0
+        sum_view = 0.0
+        for row in range(max(boxes[block, 1], 0), min(boxes[block, 3] + 1, h), stride[block]):
+            for column in range(max(boxes[block, 0], 0), min(boxes[block, 2] + 1, w), stride[block]):
+                rx, ry = rays[row, column]
+                depth = g[2, 0] * rx + g[2, 1] * ry + g[2, 2]
+                qx = (g[0, 0] * rx + g[0, 1] * ry + g[0, 2]) / depth
+                qy = (g[1, 0] * rx + g[1, 1] * ry + g[1, 2]) / depth
+                if (
+                    abs(qx - cx) > half_mm[block] - margin_mm[block, 0]
+                    or abs(qy - cy) > half_mm[block] - margin_mm[block, 1]
+                ):
+                    continue
+                vx, vy = camera_mm[0] - qx, camera_mm[1] - qy
+                across = vx * vx + vy * vy
+                total = across + camera_mm[2] * camera_mm[2]
+                scale = glass_mm / np.sqrt(index_squared * total - across)
+                px, py = qx - scale * vx, qy - scale * vy
+                if abs(px - cx) > paper_limit or abs(py - cy) > paper_limit or count == capacity:
+                    continue
+                pixels[count] = row * w + column
+                positions[count, 0] = (px - cx) / paper_limit
+                positions[count, 1] = (py - cy) / paper_limit
+                phases[count] = 2.0 * np.pi * (fx * qx + fy * qy)
+                view_phase = 2.0 * np.pi * scale * (fx * vx + fy * vy)
+                sum_cos += np.cos(view_phase)
+                sum_sin += np.sin(view_phase)
+                sum_view += camera_mm[2] / np.sqrt(total)
+                count += 1
+        views[block, 0] = sum_cos
+        views[block, 1] = sum_sin
+        views[block, 2] = sum_view
+    first[centers.shape[0]] = count
+
+
+@njit(cache=True)
+def fit(values, used, first, positions, phases, harmonics, coefficients, covariance, variance, samples):
+    """Least squares of each block's pixels on 1, x, y and its harmonics.
+
+    Args:
+        values: (n, r) one row a pixel; used: (n,) False for pixels to leave out.
+        harmonics: (b,) how many harmonics to fit.
+
+    Fills coefficients (b, 9, r), covariance (b, 9, 9) for unit variance, variance (b, r) of a pixel about the fit,
+    samples (b,); blocks with too few pixels get 0 samples.
+    """
+    rights = values.shape[1]
+    normal = np.empty((MAX_COLUMNS, MAX_COLUMNS))
+    right = np.empty((MAX_COLUMNS, rights))
+    squares = np.empty(rights)
+    row = np.empty(MAX_COLUMNS)
+    for block in range(first.shape[0] - 1):
+        columns = 3 + 2 * harmonics[block]
+        normal[:] = 0.0
+        right[:] = 0.0
+        squares[:] = 0.0
+        count = 0
+        for i in range(first[block], first[block + 1]):
+            if not used[i]:
+                continue
+            _fill_row(row, positions[i, 0], positions[i, 1], phases[i], harmonics[block])
+            for a in range(columns):
+                for b in range(a + 1):
+                    normal[a, b] += row[a] * row[b]
+                for c in range(rights):
+                    right[a, c] += row[a] * values[i, c]
+            for c in range(rights):
+                squares[c] += values[i, c] * values[i, c]
+            count += 1
+        coefficients[block] = 0.0
+        covariance[block] = 0.0
+        variance[block] = 0.0
+        samples[block] = 0
+        if count < 2 * columns or not _invert(normal, columns, covariance[block]):
+            continue
+        samples[block] = count
+        for c in range(rights):
+            explained = 0.0
+            for a in range(columns):
+                total = 0.0
+                for b in range(columns):
+                    total += covariance[block, a, b] * right[b, c]
+                coefficients[block, a, c] = total
+                explained += total * right[a, c]
+            variance[block, c] = max(squares[c] - explained, 0.0) / (count - columns)
+
+
+@njit(cache=True)
+def _fill_row(row, x, y, phase, harmonics):
+    row[0] = 1.0
+    row[1] = x
+    row[2] = y
+    if harmonics == 0:
+        return
+    c1, s1 = np.cos(phase), np.sin(phase)
+    c, s = c1, s1
+    for m in range(harmonics):
+        row[3 + 2 * m] = c
+        row[4 + 2 * m] = s
+        c, s = c * c1 - s * s1, s * c1 + c * s1
+
+
+@njit(cache=True)
+def _invert(normal, size, inverse):
+    """Inverse of a positive definite matrix (lower half given) by Cholesky; False where it is too near singular."""
+    factor = np.zeros((size, size))
+    for i in range(size):
+        for j in range(i + 1):
+            total = normal[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i == j:
+                if total <= 1e-6 * normal[i, i] or total <= 0.0:
+                    return False
+                factor[i, i] = np.sqrt(total)
+            else:
+                factor[i, j] = total / factor[j, j]
+    solved = np.zeros((size, size))
+    for i in range(size):
+        solved[i, i] = 1.0 / factor[i, i]
+        for j in range(i):
+            total = 0.0
+            for k in range(j, i):
+                total -= factor[i, k] * solved[k, j]
+            solved[i, j] = total / factor[i, i]
+    for i in range(size):
+        for j in range(size):
+            total = 0.0
+            for k in range(max(i, j), size):
+                total += solved[k, i] * solved[k, j]
+            inverse[i, j] = total
+    return True
+
+
+@njit(cache=True)
+def read_codes(plane, shift_x, shift_y, width, pixels, count, offset, scale, column, out):
+    """out[i, column] = (code - offset) * scale of the plane's sample that pixel i shares."""
+    for i in range(count):
+        row = pixels[i] // width
+        out[i, column] = (plane[row >> shift_y, (pixels[i] - row * width) >> shift_x] - offset) * scale
+
+
+@njit(cache=True)
+def block_average(values, first, average):
+    """average (b, c): mean of values (n, c) over each block's pixels."""
+    for block in range(first.shape[0] - 1):
+        start, stop = first[block], first[block + 1]
+        for c in range(values.shape[1]):
+            total = 0.0
+            for i in range(start, stop):
+                total += values[i, c]
+            average[block, c] = total / max(stop - start, 1)
+
+
+@njit(cache=True)
+def expected_chroma(ycc, first, line_luma, line_chroma, expected):
+    """Chroma (n, 2) of each pixel from its luma, on its block's colour line.
+
+    Args:
+        line_luma: (b, k) increasing luma of the line's nodes; line_chroma: (b, k, 2) their chroma.
+    """
+    nodes = line_luma.shape[1]
+    for block in range(first.shape[0] - 1):
+        luma = line_luma[block]
+        for i in range(first[block], first[block + 1]):
+            y = ycc[i, 0]
+            low, high = 0, nodes - 1
+            while high - low > 1:
+                middle = (low + high) // 2
+                if luma[middle] <= y:
+                    low = middle
+                else:
+                    high = middle
+            span = luma[high] - luma[low]
+            t = min(max((y - luma[low]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+            for c in range(2):
+                expected[i, c] = (1.0 - t) * line_chroma[block, low, c] + t * line_chroma[block, high, c]
+
+
+@njit(cache=True)
+def correct_chroma(ycc, first, phases, expected, shift, swing, dark_luma):
+    """Replace the chroma in ycc (n, 3) by the expected one plus its block's correction.
+
+    The correction's mean `shift` (b, 2) grows with the pixel's distance from the block's dark end, because colour
+    differences scale with the light; `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
+    """
+    for block in range(first.shape[0] - 1):
+        start, stop = first[block], first[block + 1]
+        total = 0.0
+        for i in range(start, stop):
+            total += max(ycc[i, 0] - dark_luma[block], 0.0) + 0.02
+        mean = total / max(stop - start, 1)
+        for i in range(start, stop):
+            weight = (max(ycc[i, 0] - dark_luma[block], 0.0) + 0.02) / mean
+            c, s = np.cos(phases[i]), np.sin(phases[i])
+            for k in range(2):
+                ycc[i, 1 + k] = (
+                    expected[i, k] + shift[block, k] * weight + swing[block, k, 0] * c + swing[block, k, 1] * s
+                )
+
+
+@njit(cache=True)
+def linearise(encoded, count, matrix, table, clip, linear, used):
+    """Linear RGB (n, 3) of encoded triples by matrix and transfer table; marks pixels with a clipped channel."""
+    last = table.shape[0] - 1
+    for i in range(count):
+        used[i] = True
+        for c in range(3):
+            e = matrix[c, 0] * encoded[i, 0] + matrix[c, 1] * encoded[i, 1] + matrix[c, 2] * encoded[i, 2]
+            if e >= clip:
+                used[i] = False
+            x = min(max(e, 0.0), 1.0) * last
+            k = min(int(x), last - 1)
+            linear[i, c] = table[k] + (x - k) * (table[k + 1] - table[k])

@@ -1,0 +1,182 @@
+"""Measure the blocks of one frame: every block's mean, as the paper has it, and the harmonics of its stripes.
+
+Each pixel is used once, as it was decoded. Its film point q and paper point q - D(v) decide whether it belongs to a
+block; the pattern's phase at q is known, so one small least-squares fit a block separates mean and harmonics.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.camera import Camera, Pose
+from arlight.probe.design import Probe
+from arlight.tracking import block_kernels as kernels
+from arlight.tracking.block_color import chroma_correction, color_lines
+from arlight.tracking.block_layout import BlockLayout, BlockView, field_blocks
+from arlight.tracking.block_means import BlockColors, BlockMeans
+from arlight.video.conversion import decoding_table
+from arlight.video.frame import Frame
+
+Array = NDArray[np.float64]
+
+_CLIP = 0.975
+"""Encoded value from which a pixel counts as clipped: codecs ring around true white."""
+_UNCLIPPED_SHARE = 0.7
+_MIN_SAMPLES = 24
+_KEPT = np.array([0, 3, 4, 5, 6, 7, 8])
+"""Columns of the fit that are measurements; 1 and 2 are the block's shading along x and y."""
+_UNRESOLVED_BLUR_PX = 0.6
+
+
+class BlockMeter:
+    """Measures a sheet's blocks in frames of one camera; buffers are allocated once."""
+
+    def __init__(self, probe: Probe, camera: Camera, max_samples: int = 1200) -> None:
+        """Prepare for a sheet and a camera.
+
+        Args:
+            max_samples: pixels a block is sampled with at most; larger images are strided.
+        """
+        self._camera = camera
+        self._slab = probe.slab
+        self._layout = BlockLayout.of_probe(probe)
+        blocks = field_blocks(probe)
+        self._patterned = np.array([block.kind == "pattern" for block in blocks])
+        self._white = np.array([block.kind == "clear_white" for block in blocks])
+        self._black = np.array([block.kind in ("clear_black", "black_white", "black_black") for block in blocks])
+        self._max_samples = max_samples
+        self._rays = camera.ray_map
+        count = len(blocks)
+        capacity = min(camera.image_size[0] * camera.image_size[1], 2 * count * max_samples)
+        self._pixels = np.empty(capacity, np.int64)
+        self._positions = np.empty((capacity, 2))
+        self._phases = np.empty(capacity)
+        self._used = np.empty(capacity, np.bool_)
+        self._encoded = np.empty((capacity, 3))
+        self._linear = np.empty((capacity, 3))
+        self._chroma = np.empty((capacity, 4))
+        self._first = np.empty(count + 1, np.int64)
+        self._views = np.empty((count, 3))
+
+    def measure(self, frame: Frame, pose: Pose, blur_px: float = 0.6, colors: BlockColors | None = None) -> BlockMeans:
+        """Means and harmonics of every block, in linear light.
+
+        Args:
+            frame: the picture; its size is the camera's.
+            pose: camera_from_probe.
+            blur_px: standard deviation of the picture's blur [px].
+            colors: where the blocks' pixels lie in RGB, from an earlier estimate; read off the reference regions
+                when not given.
+
+        Returns:
+            The measurements, in the order of `field_blocks(probe)`.
+        """
+        view = self._layout.view(self._camera, pose, blur_px if np.isfinite(blur_px) else _UNRESOLVED_BLUR_PX)
+        count = self._gather(view, pose)
+        self._read(frame, count)
+        trust = np.ones(len(self._first) - 1)
+        if max(frame.format.chroma_shift) > 0:
+            trust = self._infer_chroma(frame, view, count, colors)
+        table = decoding_table(frame.format.transfer)[:-1]
+        matrix = frame.format.rgb_from_ycc().astype(float)
+        kernels.linearise(self._encoded, count, matrix, table, _CLIP, self._linear, self._used)
+        return self._fit(view, trust)
+
+    def _gather(self, view: BlockView, pose: Pose) -> int:
+        rotation, translation = pose.rotation, pose.translation
+        plane_from_ray = np.linalg.inv(np.column_stack([rotation[:, :2], translation]))
+        area = np.prod(np.maximum(view.boxes[:, 2:] - view.boxes[:, :2], 1), axis=1)
+        stride = np.maximum(1, np.round(np.sqrt(0.4 * area / self._max_samples))).astype(np.int64)
+        layout = self._layout
+        kernels.gather(
+            view.boxes, layout.centers_mm, layout.half_mm, self._slab.max_offset_mm, view.margin_mm,
+            layout.cycles_per_mm, self._rays, plane_from_ray, pose.camera_centre_mm, self._slab.glass_mm,
+            self._slab.refractive_index**2, stride, self._pixels, self._positions, self._phases, self._first,
+            self._views,
+        )  # fmt: skip
+        return int(self._first[-1])
+
+    def _read(self, frame: Frame, count: int) -> None:
+        """Encoded triples (Y', Cb, Cr), (R', G', B') or three times grey, at the gathered pixels."""
+        width = frame.size[0]
+        format_ = frame.format
+        black, white = format_.luma_code_range
+        neutral, swing = format_.chroma_code_range
+        shift_x, shift_y = format_.chroma_shift
+        for c in range(3):
+            plane = frame.planes[min(c, len(frame.planes) - 1)]
+            if c == 0 or format_.matrix in ("rgb", "gray"):
+                kernels.read_codes(plane, 0, 0, width, self._pixels, count, black, 1.0 / white, c, self._encoded)
+            else:
+                kernels.read_codes(
+                    plane, shift_x, shift_y, width, self._pixels, count, neutral, 1.0 / swing, c, self._encoded
+                )
+
+    def _infer_chroma(self, frame: Frame, view: BlockView, count: int, colors: BlockColors | None) -> Array:
+        """Bring chroma to full resolution along the blocks' colour lines; returns how far it was seen."""
+        average = np.empty((len(self._patterned), 3))
+        kernels.block_average(self._encoded[:count], self._first, average)
+        if colors is None:
+            colors = self._reference_colors(average, frame)
+        matrix = frame.format.ycc_from_rgb().astype(float)
+        luma, chroma = color_lines(colors, frame.format.transfer, matrix)
+        # blocks without stripes have one colour: their line is a point, and their own mean corrects it
+        chroma[~self._patterned] = 0.0
+        self._chroma[:count, :2] = self._encoded[:count, 1:]
+        expected = self._chroma[:count, 2:]
+        kernels.expected_chroma(self._encoded, self._first, luma, chroma, expected)
+        first_harmonic = np.minimum(view.harmonics, 1)
+        fitted, _, _, _ = self._solve(self._chroma, first_harmonic, None)
+        swing = fitted[:, 3] - 1j * fitted[:, 4]
+        mean = np.empty((len(self._patterned), 4))
+        kernels.block_average(self._chroma[:count], self._first, mean)
+        correction = chroma_correction(swing[:, :2], swing[:, 2:], mean[:, :2] - mean[:, 2:], view.cycles_per_px)
+        kernels.correct_chroma(
+            self._encoded, self._first, self._phases, expected, correction.shift, correction.swing, luma[:, 0]
+        )
+        return correction.trust
+
+    def _reference_colors(self, average: Array, frame: Frame) -> BlockColors:
+        """One dark and one white colour for the whole sheet, from the reference regions."""
+        table = decoding_table(frame.format.transfer)[:-1]
+        encoded = np.clip(average @ frame.format.rgb_from_ycc().astype(float).T, 0.0, 1.0)
+        linear = np.interp(encoded, np.linspace(0.0, 1.0, len(table)), table)
+        seen = np.diff(self._first) >= _MIN_SAMPLES
+        black, white = linear[self._black & seen], linear[self._white & seen & (encoded.max(axis=1) < _CLIP)]
+        dark = np.median(black, axis=0) if len(black) else np.zeros(3)
+        bright = np.median(white, axis=0) if len(white) else linear[seen].max(axis=0, initial=1e-3)
+        ones = np.ones((len(average), 1))
+        return BlockColors(ones * np.maximum(dark, 1e-5), ones * np.maximum(bright - dark, 1e-4))
+
+    def _solve(
+        self, values: Array, harmonics: NDArray[np.int64], used: NDArray[np.bool_] | None
+    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        blocks = len(harmonics)
+        coefficients = np.empty((blocks, kernels.MAX_COLUMNS, values.shape[1]))
+        covariance = np.empty((blocks, kernels.MAX_COLUMNS, kernels.MAX_COLUMNS))
+        variance = np.empty((blocks, values.shape[1]))
+        samples = np.empty(blocks, np.int64)
+        if used is None:
+            self._used[:] = True
+        kernels.fit(
+            values, self._used, self._first, self._positions, self._phases, harmonics, coefficients, covariance,
+            variance, samples,
+        )  # fmt: skip
+        return coefficients, covariance, variance, samples
+
+    def _fit(self, view: BlockView, trust: Array) -> BlockMeans:
+        coefficients, covariance, variance, samples = self._solve(self._linear, view.harmonics, self._used)
+        gathered = np.diff(self._first)
+        valid = (samples >= _MIN_SAMPLES) & (samples >= _UNCLIPPED_SHARE * gathered)
+        views = self._views / np.maximum(gathered, 1)[:, None]
+        return BlockMeans(
+            values=coefficients[:, _KEPT],
+            covariance=covariance[:, _KEPT][:, :, _KEPT],
+            pixel_variance=variance,
+            harmonics=np.where(samples > 0, view.harmonics, 0),
+            samples=samples,
+            valid=valid,
+            view_phasor=views[:, 0] - 1j * views[:, 1],
+            view_cosine=np.where(gathered > 0, views[:, 2], 1.0),
+            cycles_per_px=view.cycles_per_px,
+            color_trust=trust,
+        )

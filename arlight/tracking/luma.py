@@ -1,0 +1,27 @@
+"""The luma plane as trackers want it: codes as they stand in the stream, and what light each code means."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.color import linear_from_encoded
+from arlight.video.frame import Frame
+from arlight.video.pixel_format import PixelFormat
+
+
+def luma_codes(frame: Frame) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Luma codes (h, w), uint8, and the linear light (256,) of each code.
+
+    An 8-bit luma plane is handed on as it is; other formats are brought to full-range 8 bits first.
+    """
+    format_ = frame.format
+    if format_.matrix != "rgb" and format_.bit_depth == 8:
+        return frame.planes[0], _table(format_)
+    return frame.luma(), _table(PixelFormat("gray", True, 8, transfer=format_.transfer))
+
+
+@cache
+def _table(format_: PixelFormat) -> NDArray[np.float32]:
+    black, white = format_.luma_code_range
+    return linear_from_encoded((np.arange(256) - black) / white, format_.transfer)
