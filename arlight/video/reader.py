@@ -1,5 +1,6 @@
 """Reads a video frame by frame, with the stream's own times and colour tags."""
 
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from os import PathLike
@@ -76,9 +77,8 @@ class VideoReader:
         """How many frames the file says it has, an estimate; None where it does not say."""
         if self._stream.frames:
             return int(self._stream.frames)
-        if self._stream.duration:
-            return round(self._stream.duration * self.time_base * self.frame_rate)
-        return round(self._container.duration * self.frame_rate / 1_000_000) if self._container.duration else None
+        end = _expected_end_s(self._stream)
+        return round((end - _start_s(self._stream)) * self.frame_rate) or None if end is not None else None
 
     @property
     def pixel_aspect(self) -> Fraction | None:
@@ -124,27 +124,34 @@ class VideoReader:
 
     def _pictures(self, container: InputContainer, stream: VideoStream) -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
-        broken, decoded = 0, 0
+        broken, decoded, end_s = 0, 0, 0.0
         packets = container.demux(stream)
         while True:
             try:
                 packet = next(packets, None)
                 pictures = [] if packet is None else packet.decode()
-            except av.error.FFmpegError as error:
+            except av.error.InvalidDataError:
                 broken += 1
-                self.damage = f"{broken} packets are damaged after frame {decoded}: {error.strerror}"
-                if not isinstance(error, av.error.InvalidDataError):
-                    break
+                self.damage = f"{self.path}: damaged pictures left out: {broken}, the last after frame {decoded}"
                 continue
+            except av.error.FFmpegError as error:
+                self.damage = f"{self.path}: cannot be read beyond frame {decoded} ({error.strerror})"
+                return
             if packet is None:
                 break
             for picture in pictures:
                 if picture.is_corrupt:
                     broken += 1
-                    self.damage = f"{broken} pictures are damaged after frame {decoded}"
-                else:
-                    decoded += 1
-                    yield picture
+                    self.damage = f"{self.path}: damaged pictures left out: {broken}, the last after frame {decoded}"
+                    continue
+                decoded += 1
+                if picture.pts is not None:
+                    end_s = float((picture.pts + picture.duration) * self.time_base)
+                yield picture
+        expected_s = _expected_end_s(stream)
+        if decoded and expected_s is not None and end_s + 2.0 / self.frame_rate < expected_s:
+            cut = f"ends at {end_s:.2f} s instead of {expected_s:.2f} s, it is cut off"
+            self.damage = f"{self.damage}; {cut}" if self.damage else f"{self.path}: {cut}"
 
     def _pixel_format(self, picture: av.VideoFrame) -> PixelFormat:
         name = planar_name(picture.format.name)
@@ -202,3 +209,15 @@ def _picture_stream(container: InputContainer) -> VideoStream:
     """The stream to read: not a cover picture, where there is another."""
     best = container.streams.best("video")
     return best if isinstance(best, VideoStream) else container.streams.video[0]
+
+
+def _start_s(stream: VideoStream) -> float:
+    return float((stream.start_time or 0) * (stream.time_base or 0))
+
+
+def _expected_end_s(stream: VideoStream) -> float | None:
+    """When the stream says that it ends [s], None where it does not say."""
+    if stream.duration and stream.time_base:
+        return _start_s(stream) + float(stream.duration * stream.time_base)
+    clock = re.fullmatch(r"(\d+):(\d+):(\d+\.?\d*)", stream.metadata.get("DURATION", ""))
+    return int(clock[1]) * 3600 + int(clock[2]) * 60 + float(clock[3]) if clock else None

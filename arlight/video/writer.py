@@ -126,6 +126,9 @@ class VideoWriter:
         # interleaving waits for the stream that is behind, at most this long: sound may end before the picture
         options = {"flush_packets": "1", "max_interleave_delta": "100000", **CONTAINER_OPTIONS[kind]}
         muxer = "matroska" if kind == "matroska" else "mov" if self.path.suffix.lower() == ".mov" else "mp4"
+        if kind == "mov":
+            # or an edit list rounds the first time to a millisecond
+            options["movie_timescale"] = str(min(self._time_base.denominator, 10_000_000))
         container = av.open(str(self.path), "w", format=muxer, container_options=options)
         try:
             self._source_format, self._format = frame.format, encoded_format(frame)

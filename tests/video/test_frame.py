@@ -90,7 +90,7 @@ def test_bilinear_chroma_lies_where_its_site_says(shift, location):
     np.testing.assert_allclose(found[4:-4, 4:-4], (120 * column - 90 * row)[4:-4, 4:-4], atol=1.0)
 
 
-def stored_420(encoded, format_, size):
+def stored_420(encoded, format_):
     """Planes of encoded R'G'B' (h, w, 3), their chroma averaged over the box around each left site."""
     ycc = encoded @ format_.ycc_from_rgb().T
     rows = (ycc[0::2] + ycc[1::2]) / 2
@@ -102,8 +102,7 @@ def stored_420(encoded, format_, size):
 
 def chroma_errors(linear):
     """(guided, bilinear): worst channel's error of the mean, and rms error, relative to the mean."""
-    size = linear.shape[1], linear.shape[0]
-    frame = Frame(0, 0.0, stored_420(encoded_from_linear(linear), YUV420, size), YUV420)
+    frame = Frame(0, 0.0, stored_420(encoded_from_linear(linear), YUV420), YUV420)
     inner, results = np.s_[8:-8, 8:-8], []
     for mode in ("guided", "bilinear"):
         difference = (frame.linear_rgb(chroma=mode) - linear)[inner]
