@@ -90,10 +90,12 @@ def _returned_by_upper_face(radiosity, film_squared, shifts, weights, out):  # t
                 continue
             shift, weight = shifts[k, 1], weights[k]
             first, last = max(0, -2 * shift), min(columns, columns - 2 * shift)
+            if first >= last:
+                continue
+            # whole slices: plain loops over them are vectorised
+            film = film_squared[film_row, first + shift : last + shift]
             for channel in range(channels):
-                for column in range(first, last):
-                    out[channel, row, column] += (
-                        weight
-                        * film_squared[film_row, column + shift]
-                        * radiosity[channel, paper_row, column + 2 * shift]
-                    )
+                lit = radiosity[channel, paper_row, first + 2 * shift : last + 2 * shift]
+                target = out[channel, row, first:last]
+                for i in range(target.size):
+                    target[i] += weight * film[i] * lit[i]

@@ -13,15 +13,18 @@ from arlight.errors import ArlightError
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """Imaging defects of a camera. Values are linear, 1 is full scale."""
+    """Imaging defects of a camera. Values are linear, 1 is full scale.
+
+    The defaults are a phone's in good light, whose video pixels are each binned from several of the sensor's.
+    """
 
     blur_px: float = 0.6
     """Standard deviation of the lens blur, a Gaussian in linear light [px]."""
     vignetting: float = 0.0
     """Strength of the darkening toward the corners: 1 for the natural cos^4 of the angle off the axis, 0 for none."""
-    read_noise: float = 0.002
+    read_noise: float = 0.0015
     """Standard deviation of the noise in the dark."""
-    gain: float = 1e-4
+    gain: float = 3e-5
     """Variance of the shot noise per unit of signal: 1 / electrons at full scale."""
 
     def __post_init__(self) -> None:

@@ -55,7 +55,7 @@ def synthesize(
     light = TrueLight(script, probe.slab, probe.frequencies)
     motion = CameraMotion(settings.path, settings.sheet_width_px, settings.tilt_deg, settings.duration_s, settings.seed)
     noise = np.random.default_rng(settings.seed)
-    sampling = Sampling(least_per_side=settings.samples_per_side)
+    sampling = Sampling(settings.sample_mm, settings.samples_per_side)
     printed = SheetLayers.of_probe(probe) if layers is None else layers
     stage = Stage(printed, probe.slab, camera, script, settings.bounces, sampling)
     try:

@@ -35,6 +35,7 @@ def test_default_camera_sees_about_sixty_degrees():
         ({"white": 0.0}, "white"),
         ({"bounces": -1}, "bounces"),
         ({"samples_per_side": 0}, "samples_per_side"),
+        ({"sample_mm": 0.0}, "sample_mm"),
     ],
 )
 def test_impossible_settings_are_refused(wrong, message):
