@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from arlight.estimation.lighting import Lighting as Lighting
     from arlight.lighting_tracker import FrameEstimate as FrameEstimate
     from arlight.lighting_tracker import LightingTracker as LightingTracker
+    from arlight.lighting_tracker import TrackerSettings as TrackerSettings
     from arlight.pipeline import FrameResult as FrameResult
     from arlight.pipeline import Pipeline as Pipeline
     from arlight.probe.design import Probe as Probe
     from arlight.probe.storage import load_probe as load_probe
     from arlight.rendering.relight import Relighter as Relighter
+    from arlight.rendering.relight import RelightSettings as RelightSettings
     from arlight.results.log import read_log as read_log
     from arlight.video.frame import Frame as Frame
     from arlight.video.reader import VideoReader as VideoReader
@@ -35,7 +37,9 @@ _PUBLIC = {
     "Pipeline": "arlight.pipeline",
     "Pose": "arlight.camera",
     "Probe": "arlight.probe.design",
+    "RelightSettings": "arlight.rendering.relight",
     "Relighter": "arlight.rendering.relight",
+    "TrackerSettings": "arlight.lighting_tracker",
     "VideoReader": "arlight.video.reader",
     "VideoWriter": "arlight.video.writer",
     "load_probe": "arlight.probe.storage",

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
-from arlight.lighting_tracker import FrameEstimate, LightingTracker
+from arlight.lighting_tracker import FrameEstimate, LightingTracker, TrackerSettings
 from arlight.probe.design import Probe
 from arlight.tracking.pose import ProbePose
 from arlight.video.frame import Frame
@@ -44,15 +44,25 @@ class FrameResult:
 class Pipeline:
     """Frames in, lit composites out; the same as `LightingTracker` with relighting and compositing."""
 
-    def __init__(self, probe: Probe, camera: Camera, relighter: FrameRelighter | None = None) -> None:
+    def __init__(
+        self,
+        probe: Probe,
+        camera: Camera,
+        relighter: FrameRelighter | None = None,
+        settings: TrackerSettings | None = None,
+    ) -> None:
         """Prepare the loop.
 
         Args:
             probe: the sheet in the footage.
             camera: the camera that filmed it.
             relighter: draws the object; None leaves the frames as they are (lighting only).
+            settings: choices of the estimation.
+
+        Raises:
+            ProbeError: the sheet cannot be tracked.
         """
-        self._tracker = LightingTracker(probe, camera)
+        self._tracker = LightingTracker(probe, camera, settings)
         self._relighter = relighter
 
     def process(self, frame: Frame) -> FrameResult:

@@ -1,7 +1,8 @@
 """The object that is drawn, where it stands and what draws it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import tyro
 from rich.console import Console
 from rich.progress import Progress
 
@@ -20,14 +21,7 @@ class RelightingOptions:
 
     object: OptionalFile = None
     """A mesh to draw (.glb, .obj, .ply, .stl); an object of our own by default."""
-    size_mm: float = 60.0
-    """Largest side of the object [mm]."""
-    position_mm: tuple[float, float] = (0.0, 0.0)
-    """Where the object stands, from the sheet's centre: right and up as printed [mm]."""
-    yaw_deg: float = 0.0
-    """Turn of the object about its vertical axis, counter-clockwise from above [deg]."""
-    roughness: float = 0.3
-    """Roughness of the object's gloss, 0.05 (polished) to 1."""
+    settings: tyro.conf.OmitArgPrefixes[RelightSettings] = field(default_factory=RelightSettings)
 
 
 def make_relighter(options: RelightingOptions, probe: Probe, camera: Camera) -> FrameRelighter:
@@ -37,10 +31,7 @@ def make_relighter(options: RelightingOptions, probe: Probe, camera: Camera) -> 
         MeshError: the object cannot be used.
         RenderingUnavailable: there is no headless OpenGL.
     """
-    settings = RelightSettings(
-        size_mm=options.size_mm, position_mm=options.position_mm, yaw_deg=options.yaw_deg, roughness=options.roughness
-    )
     mesh = default_object() if options.object is None else load_mesh(options.object)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing the object", total=1.0)
-        return Relighter(mesh, probe, camera, settings, lambda share: progress.update(task, completed=share))
+        return Relighter(mesh, probe, camera, options.settings, lambda share: progress.update(task, completed=share))
