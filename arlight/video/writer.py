@@ -25,8 +25,9 @@ from arlight.video.stream_format import tags_of
 CONTAINERS = (".mp4", ".m4v", ".mov", ".mkv")
 """Endings of the containers that keep H.264 with its own times."""
 CONTAINER_OPTIONS: dict[str, dict[str, str]] = {
-    # a fragment a frame until the file is closed, a plain file after; the header waits for the first time stamp
-    "mov": {"movflags": "+hybrid_fragmented+frag_every_frame+delay_moov"},
+    # a fragment a frame (the flag for that, unlike this duration of 1 us, spoils the times of sound) until the file is
+    # closed, a plain file after; the header waits for the first time stamp
+    "mov": {"movflags": "+hybrid_fragmented+delay_moov", "frag_duration": "1"},
     # a cluster a frame
     "matroska": {"cluster_time_limit": "1"},
 }
@@ -85,7 +86,7 @@ class VideoWriter:
 
         Raises:
             OutputError: the file cannot be written.
-            ValueError: the frame's size or format differs from the first one's.
+            ValueError: the frame's size differs from the first one's.
         """
         try:
             if self._container is None:
@@ -131,7 +132,7 @@ class VideoWriter:
             options["movie_timescale"] = str(min(self._time_base.denominator, 10_000_000))
         container = av.open(str(self.path), "w", format=muxer, container_options=options)
         try:
-            self._source_format, self._format = frame.format, encoded_format(frame)
+            self._format = encoded_format(frame)
             self._stream = self._video_stream(container, frame)
             wanted = self._like if self._audio_wanted else None
             self._audio = AudioCopy(wanted.path, container, self.path) if wanted else None

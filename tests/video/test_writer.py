@@ -72,7 +72,8 @@ def test_colour_tags_depth_and_sites_are_kept(make_clip, tmp_path, location, lay
     "options",
     [
         {"layout": "yuv422p"}, {"layout": "yuv444p"}, {"codec": "ffv1", "layout": "bgr0", "name": "clip.mkv"},
-        {"codec": "ffv1", "layout": "gray", "name": "clip.mkv"}, {"codec": "ffv1", "layout": "gbrp12le", "name": "clip.mkv"},
+        {"codec": "ffv1", "layout": "gray", "name": "clip.mkv"},
+        {"codec": "ffv1", "layout": "gbrp12le", "name": "clip.mkv"},
         {"codec": "mjpeg", "layout": "yuvj422p", "name": "clip.avi"}, {"rotation": 90}, {"rotation": 270},
     ],
     ids=str,
@@ -155,30 +156,32 @@ def test_frames_that_share_a_time_are_kept_apart(tmp_path):
 
 
 CRASH = """
-import sys, numpy as np
-from arlight.video.frame import Frame
+import sys, time
+from arlight.video.reader import VideoReader
 from arlight.video.writer import VideoWriter
-writer = VideoWriter(sys.argv[1])
-rng = np.random.default_rng(0)
-for i in range(40):
-    writer.write(Frame.from_rgb(rng.integers(0, 256, (48, 64, 3)).astype(np.uint8), i, i / 30))
-    if i == 39:
+reader = VideoReader(sys.argv[1])
+writer = VideoWriter(sys.argv[2], reader)
+for frame in reader:
+    writer.write(frame)
+    if frame.index == 39:
         print("written", flush=True)
-        import time
         time.sleep(60)
 """
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".mov", ".mkv"])
 @pytest.mark.skipif(os.name != "posix", reason="needs a signal that cannot be caught")
-def test_a_killed_program_leaves_what_it_wrote(tmp_path, ending):
-    output = tmp_path / f"out{ending}"
-    with subprocess.Popen([sys.executable, "-c", CRASH, str(output)], stdout=subprocess.PIPE) as process:
+def test_a_killed_program_leaves_what_it_wrote(make_clip, tmp_path, ending):
+    source, output = make_clip("clip.mkv", frames=60, sound="aac"), tmp_path / f"out{ending}"
+    command = [sys.executable, "-c", CRASH, str(source), str(output)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout.readline() == b"written\n"
         process.send_signal(signal.SIGKILL)
-    frames = list(VideoReader(output))
-    assert len(frames) >= 39
-    np.testing.assert_allclose([f.time_s for f in frames], np.arange(len(frames)) / 30, atol=6e-4)
+    frames, before = list(VideoReader(output)), list(VideoReader(source))
+    assert 38 <= len(frames) <= 40
+    times = [f.time_s for f in before[: len(frames)]]
+    np.testing.assert_allclose([f.time_s for f in frames], times, atol=6e-4)
+    assert float(packets_of(output, "audio")[-1][0]) > 1.15
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
@@ -269,7 +272,7 @@ def test_frames_of_another_size_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("source", "expected"),
     [
-        (PixelFormat("bt2020", True, 12, (1, 1), (0.0, 0.0), "hlg"), PixelFormat("bt2020", True, 10, (1, 1), (0.0, 0.0), "hlg")),
+        (PixelFormat("bt2020", True, 12, (1, 1), (0.0, 0.0)), PixelFormat("bt2020", True, 10, (1, 1), (0.0, 0.0))),
         # a turned 4:2:0 picture may have sites that have no name
         (PixelFormat("bt709", False, 8, (1, 1), (1.0, 0.5)), PixelFormat("bt709", False, 8, (1, 1), (0.0, 0.5))),
         (PixelFormat("rgb", True, 16), PixelFormat("bt601", False, 10, (1, 1), (0.0, 0.5))),
