@@ -97,7 +97,9 @@ class _Level:
 
 
 _FINEST = _Level(8, 0.01, (0.5, OCCLUDED_BELOW), 1)
-_COARSER = _Level(5, 0.2, (0.2, 0.4), 2)
+_COARSER = _Level(5, 0.2, (-1.0, 0.2), 2)
+_WIDENING = 1.2
+"""Blur of the template on a shrunk picture, in its pixels: wider than the picture's, it reaches farther."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +170,7 @@ class FiducialAlignment:
             picture: the region around the sheet.
             start: first guess, to within a few pixels; more with a coarser first level.
             blur_px: standard deviation of the whole blur in the picture [px].
-            coarsest: the first level shrinks the picture by this: 1, 2 or 4.
+            coarsest: the first level shrinks the picture by this: 1, 2, 4 or 8.
 
         Returns:
             The alignment, or None where no marker is in sight.
@@ -193,9 +195,9 @@ class FiducialAlignment:
     def _fit(self, picture: Picture, start: Pose, blur_px: float, shrink: int) -> Pose | None:
         """Gauss-Newton at one resolution; None when no marker takes part."""
         level = _FINEST if shrink == 1 else _COARSER
-        sharpness = math.sqrt(blur_px**2 + SAMPLING_VARIANCE_PX2 * (shrink**2 - 1))
+        drawn_px = blur_px if shrink == 1 else max(blur_px, _WIDENING * shrink)
         work = self._workspaces[level.share]
-        self._render(work, start, sharpness, max(sharpness, 0.9 * shrink))
+        self._render(work, start, drawn_px, max(drawn_px, 0.9))
         self._coefficients[:] = 0.0
         codes, table, window = picture.level(shrink)
         rotation, translation = start.rotation, start.translation

@@ -37,33 +37,79 @@ def planar_poses(camera: Camera, points_mm: Array, pixels: Array, markers: int =
         markers: how many markers they belong to.
 
     Returns:
-        Up to two hypotheses with the camera above the sheet; none where the points are degenerate.
+        Up to two hypotheses with the camera above the sheet, one where refinement leads both to the same; none where the points are degenerate.
 
     Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
     """
     points = np.column_stack([points_mm, np.zeros(len(points_mm))])
-    rays = np.ascontiguousarray(camera.rays(pixels))
-    if len(points) < 4 or not np.all(np.isfinite(rays)):
+    if len(points) < 4:
         return []
-    try:
-        # On undistorted rays: solvePnP's own undistortion stops after five rounds, too early for a strong lens.
-        solved = cv2.solvePnPGeneric(points, rays, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
-    except cv2.error:
-        return []
-    hypotheses = []
-    for rvec, translation in zip(solved[1], solved[2], strict=True):
-        if not (np.all(np.isfinite(rvec)) and np.all(np.isfinite(translation))):
-            continue
-        start_t = np.array(translation, float)
-        start_r = np.array(rvec, float)
+    hypotheses: list[PoseHypothesis] = []
+    for start in _poses_of_homography(np.asarray(points_mm, float), camera.rays(pixels)):
+        # Columns: given flat vectors, OpenCV 5.0 returns them unrefined.
         rvec, translation = cv2.solvePnPRefineLM(
-            points, pixels, camera.camera_matrix, camera.distortion, start_r, start_t
+            points, pixels, camera.camera_matrix, camera.distortion, start.rvec[:, None], start.translation[:, None]
         )
         pose = Pose.from_rvec(rvec, translation)
-        if is_seen_from_above(pose, points):
+        if is_seen_from_above(pose, points) and not any(_same(pose, other.pose) for other in hypotheses):
             error = camera.project(pose, points) - pixels
             hypotheses.append(PoseHypothesis(pose, float(np.sqrt(np.mean(np.sum(error**2, axis=1)))), markers))
     return sorted(hypotheses, key=lambda hypothesis: hypothesis.rms_px)
+
+
+def _poses_of_homography(points_mm: Array, rays: Array) -> list[Pose]:
+    """Both poses that agree with the plane's homography to first order at the points' middle.
+
+    Written out, because SOLVEPNP_IPPE of OpenCV 5.0 returns rotations that are far off.
+    """
+    middle = points_mm.mean(axis=0)
+    scale = float(np.max(np.abs(points_mm - middle)))
+    if scale == 0.0 or not np.all(np.isfinite(rays)):
+        return []
+    homography, _ = cv2.findHomography((points_mm - middle) / scale, rays)
+    if homography is None or abs(homography[2, 2]) < 1e-12 or not np.all(np.isfinite(homography)):
+        return []
+    h = homography / homography[2, 2]
+    sight = h[:2, 2]
+    toward = _turn_z_to(np.append(sight, 1.0))
+    slope = (h[:2, :2] - np.outer(sight, h[2, :2])) / scale
+    projected = toward[:2, :2] - np.outer(sight, toward[2, :2])
+    flat = np.linalg.solve(projected, slope)
+    largest = float(np.linalg.norm(flat, 2))
+    if largest < 1e-12:
+        return []
+    flat /= largest
+    rest = np.eye(2) - flat.T @ flat
+    third = np.sqrt(np.maximum(np.diag(rest), 0.0)) * np.array([1.0, 1.0 if rest[0, 1] >= 0.0 else -1.0])
+    poses = []
+    for row in (third, -third):
+        first, second = np.append(flat[:, 0], row[0]), np.append(flat[:, 1], row[1])
+        rotation = toward @ np.column_stack([first, second, np.cross(first, second)])
+        turned = points_mm @ rotation[:, :2].T
+        poses.append(Pose(rotation, _translation(turned, rays)))
+    return poses
+
+
+def _same(a: Pose, b: Pose) -> bool:
+    """Whether two poses differ by less than refinement leaves."""
+    return bool(np.allclose(a.rotation, b.rotation, atol=1e-3))
+
+
+def _turn_z_to(direction: Array) -> Array:
+    """The smallest rotation that takes the z axis to a direction in front of the camera."""
+    x, y, z = direction / np.linalg.norm(direction)
+    c = 1.0 / (1.0 + z)
+    return np.array([[1.0 - c * x * x, -c * x * y, x], [-c * x * y, 1.0 - c * y * y, y], [-x, -y, z]])
+
+
+def _translation(turned: Array, rays: Array) -> Array:
+    """(3,) the translation that best puts points (n, 3), already turned, on their rays (n, 2); linear least squares."""
+    n = len(turned)
+    matrix = np.zeros((2 * n, 3))
+    matrix[:n, 0] = matrix[n:, 1] = 1.0
+    matrix[:n, 2], matrix[n:, 2] = -rays[:, 0], -rays[:, 1]
+    right = np.concatenate([rays[:, k] * turned[:, 2] - turned[:, k] for k in range(2)])
+    return np.linalg.lstsq(matrix, right, rcond=None)[0]
 
 
 def is_seen_from_above(pose: Pose, points_mm: Array) -> bool:

@@ -20,6 +20,8 @@ _BLUR_RATE = 0.2
 _REMEMBERED_S = 1.0
 """How long after a loss the last pose is still worth a try [s]."""
 
+_WIDEST = 8
+"""Shrinkage of the first level where a pose is known to some 10 px only."""
 _TIE = 0.02
 """Sums of the markers' correlations that differ by less are no reason to prefer one pose."""
 
@@ -110,10 +112,10 @@ class PoseTracker:
         """Align near the predicted pose, then with a wider reach, then near the last pose."""
         if self._last is None or abs(time_s - self._last.time_s) > _REMEMBERED_S:
             return None
-        attempts = [(self._last.pose, 4)]
+        attempts = [(self._last.pose, _WIDEST)]
         if self._before is not None:
             predicted = predict(self._before.pose, self._before.time_s, self._last.pose, self._last.time_s, time_s)
-            attempts = [(predicted, 2), (predicted, 4), *attempts]
+            attempts = [(predicted, 2), (predicted, _WIDEST), *attempts]
         for start, coarsest in attempts:
             found = self._align(luma, table, start, coarsest)
             if found is not None and found.accepted:
@@ -143,7 +145,7 @@ class PoseTracker:
             detections = self._detector.detect(luma, scale)
             candidates = []
             for hypothesis in poses_from_detections(self._camera, self._probe, detections):
-                found = self._align(luma, table, hypothesis.pose, 4)
+                found = self._align(luma, table, hypothesis.pose, _WIDEST)
                 if found is not None and found.accepted:
                     candidates.append(found)
             if candidates:
