@@ -22,6 +22,8 @@ _REMEMBERED_S = 1.0
 
 _WIDEST = 8
 """Shrinkage of the first level where a pose is known to some 10 px only."""
+_SHRINKAGES = (2, 1, _WIDEST)
+"""First levels to try, in turn: the usual one, one for markers of few pixels, one for a first guess that is far off."""
 _TIE = 0.02
 """Sums of the markers' correlations that differ by less are no reason to prefer one pose."""
 
@@ -87,7 +89,7 @@ class PoseTracker:
             return ProbePose.lost()
         self._misses = 0
         self._before, self._last = self._last, _Sighting(found.pose, time_s)
-        if self._blur_px is None:
+        if self._blur_px is None or not _is_like(found.blur_px, self._blur_px):
             self._blur_px = found.blur_px
         else:
             self._blur_px += _BLUR_RATE * (found.blur_px - self._blur_px)
@@ -115,7 +117,7 @@ class PoseTracker:
         attempts = [(self._last.pose, _WIDEST)]
         if self._before is not None:
             predicted = predict(self._before.pose, self._before.time_s, self._last.pose, self._last.time_s, time_s)
-            attempts = [(predicted, 2), (predicted, _WIDEST), *attempts]
+            attempts = [*((predicted, shrink) for shrink in _SHRINKAGES), *attempts]
         for start, coarsest in attempts:
             found = self._align(luma, table, start, coarsest)
             if found is not None and found.accepted:
@@ -130,13 +132,14 @@ class PoseTracker:
             return None
         x0, y0, x1, y1 = region
         picture = Picture(np.array(luma[y0:y1, x0:x1], order="C"), table, (x0, y0))
-        if self._blur_px is not None:
-            return self._alignment.align(picture, start, self._blur_px, coarsest)
-        found = self._alignment.align(picture, start, _TYPICAL_BLUR_PX, coarsest)
+        blur = self._blur_px or _TYPICAL_BLUR_PX
+        found = self._alignment.align(picture, start, blur, coarsest)
         for _ in range(3):
-            if found is None:
-                return None
-            found = self._alignment.align(picture, found.pose, found.blur_px, 1)
+            if found is None or _is_like(found.blur_px, blur):
+                break
+            # A blur that is far off widens the noise, it does not shift: the pose is a good start for the right one.
+            blur = found.blur_px
+            found = self._alignment.align(picture, found.pose, blur, 1)
         return found
 
     def _acquire(self, luma: NDArray[np.uint8], table: NDArray[np.float32]) -> Alignment | None:
@@ -145,9 +148,11 @@ class PoseTracker:
             detections = self._detector.detect(luma, scale)
             candidates = []
             for hypothesis in poses_from_detections(self._camera, self._probe, detections):
-                found = self._align(luma, table, hypothesis.pose, _WIDEST)
-                if found is not None and found.accepted:
-                    candidates.append(found)
+                for shrink in _SHRINKAGES:
+                    found = self._align(luma, table, hypothesis.pose, shrink)
+                    if found is not None and found.accepted:
+                        candidates.append(found)
+                        break
             if candidates:
                 return self._choose(candidates)
         return None
@@ -165,6 +170,11 @@ class PoseTracker:
         """Resolutions to search at: all at first and just after a loss, then one a frame, in turn."""
         scales = (0.5, 1.0, 2.0) if min(self._camera.image_size) >= 480 else (1.0, 2.0, 0.5)
         return scales if self._misses < 2 else (scales[self._misses % len(scales)],)
+
+
+def _is_like(blur_px: float, other_px: float) -> bool:
+    """Whether two estimates of the blur differ by no more than one frame's estimate is worth."""
+    return abs(blur_px - other_px) < 0.25 * other_px
 
 
 def predict(before: Pose, before_s: float, last: Pose, last_s: float, time_s: float) -> Pose:
