@@ -41,7 +41,7 @@ def load_mesh(path: Path | str, up: UpAxis = "auto", max_vertices: int = MAX_VER
     if not path.is_file():
         raise MeshError(f"{path}: no such file; a triangle mesh (GLB, OBJ, PLY, STL) is expected there")
     try:
-        mesh = fit_to_budget(_joined([_read_part(part) for part in _parts(path)]), max_vertices)
+        mesh = fit_to_budget(_joined([from_trimesh(part) for part in _parts(path)]), max_vertices)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error
     y_up = up == "y" or (up == "auto" and path.suffix.lower() in _Y_UP)
@@ -64,8 +64,12 @@ def _parts(path: Path) -> list[trimesh.Trimesh]:
     return triangles
 
 
-def _read_part(part: trimesh.Trimesh) -> Mesh:
-    """One piece of the scene, its corners split at creases and texture seams."""
+def from_trimesh(part: trimesh.Trimesh) -> Mesh:
+    """A mesh that trimesh holds, split at creases and texture seams, in its own unit and axes.
+
+    Raises:
+        MeshError: it holds no usable triangles.
+    """
     vertices, faces = np.asarray(part.vertices, float), np.asarray(part.faces)
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise MeshError(f"a face names vertex {faces.max()} of {len(vertices)}; the file is damaged")
