@@ -1,0 +1,41 @@
+"""Running totals of a run."""
+
+import math
+
+import pytest
+
+from arlight.results.record import LogRecord
+from arlight.results.statistics import RunStatistics
+
+
+def record_of(frame: int, status: str = "tracked", ms: float = 2.0, chi2: float = 1.0) -> LogRecord:
+    return LogRecord(frame, frame / 30, status, None, math.nan, None, None, None, chi2, {"track": ms})
+
+
+def test_nothing_yet():
+    statistics = RunStatistics()
+    assert statistics.frames == statistics.tracked == 0
+    assert statistics.tracked_share == statistics.frames_per_second == 0.0
+    assert statistics.median_ms == {}
+    assert math.isnan(statistics.median_chi2)
+
+
+def test_frames_are_counted_by_status():
+    statistics = RunStatistics()
+    for frame, status in enumerate(["tracked", "tracked", "coasting", "lost", "tracked"]):
+        statistics.add(record_of(frame, status))
+    assert statistics.frames == 5
+    assert statistics.tracked == 3
+    assert statistics.tracked_share == pytest.approx(0.6)
+    assert statistics.statuses == {"tracked": 3, "coasting": 1, "lost": 1}
+    assert statistics.frames_per_second > 0.0
+
+
+def test_medians_are_of_what_was_measured():
+    statistics = RunStatistics()
+    for frame, ms in enumerate([1.0, 9.0, 3.0]):
+        statistics.add(record_of(frame, ms=ms, chi2=ms))
+    statistics.add(record_of(3, ms=3.0, chi2=math.nan))
+    statistics.add(record_of(4, "coasting", ms=3.0, chi2=500.0))
+    assert statistics.median_ms == {"track": 3.0}
+    assert statistics.median_chi2 == 3.0
