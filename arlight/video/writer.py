@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from os import PathLike
@@ -76,6 +77,7 @@ class VideoWriter:
         self._options = {"preset": preset, "crf": str(crf), "tune": "zerolatency"}
         self._container: OutputContainer | None = None
         self._audio: AudioCopy | None = None
+        self._failed = False
         self._last_time = -(2**62)
         check_output(self.path, [like.path] if like else [])
         if like and audio:
@@ -93,6 +95,7 @@ class VideoWriter:
                 self._open(frame)
             self._write(frame)
         except (av.error.FFmpegError, OSError) as error:
+            self._failed = True
             raise OutputError(
                 f"{self.path}: cannot be written ({error.strerror}); check the folder, the space on the disk and "
                 "whether another program has the file open"
@@ -104,6 +107,11 @@ class VideoWriter:
         if container is None:
             return
         try:
+            if self._failed:
+                # the muxer may be half open: handing it more would crash it, and the error is known already
+                with suppress(av.error.FFmpegError, OSError):
+                    container.close()
+                return
             container.mux(self._stream.encode(None))
             container.close()
         except (av.error.FFmpegError, OSError) as error:

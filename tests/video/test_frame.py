@@ -181,6 +181,20 @@ def test_flat_light_is_encoded_to_the_nearest_codes(name):
     assert all(np.ptp(p) == 0 for p in changed.planes)
 
 
+def test_a_changed_pixel_moves_its_chroma_sample_by_its_own_share_only():
+    # random chroma is not what guided upsampling expects: much of each sample is left unexplained by its pixels
+    frame = random_frame(YUV420)
+    touched = frame.linear_rgb() + np.float32(3e-5)
+    one_of_16 = frame.linear_rgb()
+    one_of_16[::4, ::4] = touched[::4, ::4]
+
+    def mean_change(linear):
+        changed = frame.with_linear_rgb(frame.full_region, linear).planes[1:]
+        return np.mean([np.abs(a.astype(int) - b).mean() for a, b in zip(changed, frame.planes[1:], strict=True)])
+
+    assert mean_change(one_of_16) < 0.15 * mean_change(touched)
+
+
 def test_light_outside_the_range_is_clamped_and_no_number_is_no_change():
     frame = Frame.from_rgb(np.full((7, 4, 3), 100, np.uint8))
     linear = frame.linear_rgb()

@@ -160,7 +160,7 @@ import sys, time
 from arlight.video.reader import VideoReader
 from arlight.video.writer import VideoWriter
 reader = VideoReader(sys.argv[1])
-writer = VideoWriter(sys.argv[2], reader)
+writer = VideoWriter(sys.argv[2], reader, preset="medium")
 for frame in reader:
     writer.write(frame)
     if frame.index == 39:
