@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from arlight.camera import Camera
+from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
@@ -114,8 +114,8 @@ class LightingTracker:
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
         for _ in range(1 if self._last else _FIRST_PASSES):
             last = self._last
-            colors, blur = (last.colors, last.blur_variance_px2) if last else (None, blur_px**2)
+            colors, nuisance = (last.colors, last.nuisance) if last else (None, Nuisance(blur_px**2))
             means = self._meter.measure(frame, pose.camera_from_probe, blur_px, colors)
             measured = perf_counter()
-            self._last = self._estimator.estimate(means, frame.time_s, blur)
+            self._last = self._estimator.estimate(means, frame.time_s, nuisance)
         return self._last.lighting, measured

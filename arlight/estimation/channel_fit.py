@@ -15,9 +15,25 @@ Array = NDArray[np.float64]
 _ITERATIONS = 6
 _FREEDOM = 4.0
 """Degrees of freedom of the Student-t distribution of the rows' errors."""
+_SPARKLE = 0.0008
+"""Usual standard deviation of what a block mirrors beside the smooth field, relative to white."""
+_FIRST_SPARKLE = 0.02
+"""The same in the first iteration, wide enough that no lamp pulls the solution before it is recognised."""
 _BLUR_RANGE_PX2 = (0.0, 6.0)
+_LOWER_FACE_SPREAD = 0.5
+"""Prior standard deviation of the lower face's reflection about Fresnel's."""
 _WEAKEST_TRANSFER = 0.12
 """Harmonics that blur has taken below this share are not used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nuisance:
+    """What the stripes reveal beside the lighting; one frame's is the next one's first guess."""
+
+    blur_variance_px2: float = 0.4
+    """Variance of the picture's blur [px^2]."""
+    lower_face: float = 1.0
+    """Mirror reflection in the glass's lower face, relative to Fresnel's; less where paper sticks to the glass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,17 +47,17 @@ class ChannelFit:
     field: Array
     """(blocks,) smooth reflection field [full scale]."""
     reflection: Array
-    """(blocks,) reflection that each block's own mean shows; the field's where it shows none."""
+    """(blocks,) field plus what each block mirrors beside it, such as a lamp."""
     lit: Array
     """(blocks, 7) rows that the lighting predicts, blur included."""
     chi2: float
     """Robust chi-square per row; nan when no row was usable."""
-    blur_variance_px2: float
-    """Blur at which the stripes fit best [px^2]."""
+    nuisance: Nuisance
+    """Blur and lower face at which the stripes fit best."""
 
 
 def fit_channel(
-    means: BlockMeans, channel: int, white: float, rows: Array, mirror: Array, system: BlockSystem, blur: float
+    means: BlockMeans, channel: int, white: float, rows: Array, lower: Array, system: BlockSystem, nuisance: Nuisance
 ) -> ChannelFit:
     """Fit one channel.
 
@@ -49,35 +65,66 @@ def fit_channel(
         means: the frame's measurements.
         channel: 0, 1, 2 for red, green, blue.
         white: radiance of clear film on white paper.
-        rows: (blocks, 7, 3) response before blur; mirror: (blocks, 7) response to the reflection field.
+        rows: (blocks, 7, 3) response before blur; lower: (blocks, 7) what the lower face mirrors where the upper
+            face mirrors 1.
         system: gathers and solves the normal equations.
-        blur: first guess of the blur's variance [px^2].
+        nuisance: first guess.
     """
     values = means.values[:, :, channel]
+    variance = row_variance(means, channel, white)
     weights = np.ones_like(values)
+    lamp = np.full(len(values), (_FIRST_SPARKLE * white) ** 2)
     for _ in range(_ITERATIONS):
-        transfer = optical_transfer(means.cycles_per_px, blur)
-        design, reflecting = rows * transfer[..., None], mirror * transfer
+        transfer = optical_transfer(means.cycles_per_px, nuisance.blur_variance_px2)
+        design = rows * transfer[..., None]
+        mirror = nuisance.lower_face * lower * transfer
+        mirror[:, 0] += 1.0
         usable = _usable(means, transfer)
-        variance = row_variance(means, channel, white, transfer)
         precision = np.where(usable, weights / variance, 0.0)
-        solution, normal = system.solve(design, reflecting, values, precision)
+        solution, normal = system.solve(design, mirror, values, _without_lamps(precision, mirror, lamp))
         lit, field = system.lit(solution, design), system.field(solution)
-        residual = values - lit - reflecting * field[:, None]
+        residual = values - lit - mirror * field[:, None]
+        extra, lamp = _next_lamps(residual, precision, mirror, lamp, white)
+        residual = residual - mirror * extra[:, None]
         squared = residual**2 / variance
-        weights = (_FREEDOM + 1.0) / (_FREEDOM + squared)
-        blur = _next_blur(blur, lit, residual, precision, means.cycles_per_px)
+        # a stray mean is a lamp's, which has an unknown of its own; weights judge the harmonics
+        weights[:, 1:] = (_FREEDOM + 1.0) / (_FREEDOM + squared[:, 1:])
+        reflection = field + extra
+        nuisance = _next_nuisance(nuisance, lit, lower * transfer * reflection[:, None], residual, precision, means)
     size = len(solution) - system.field_size
-    own = (values[:, 0] - lit[:, 0]) / mirror[:, 0]
     return ChannelFit(
         packed=solution[:size],
         covariance=np.linalg.inv(normal)[:size, :size],
         field=field,
-        reflection=np.where(usable[:, 0], own, field),
+        reflection=reflection,
         lit=lit,
         chi2=float(np.mean((weights * squared)[usable])) if np.any(usable) else float("nan"),
-        blur_variance_px2=blur,
+        nuisance=nuisance,
     )
+
+
+def _without_lamps(precision: Array, mirror: Array, lamp: Array) -> Array:
+    """Precision matrices (blocks, 7, 7) when each block mirrors an unknown extra of variance `lamp` (blocks,).
+
+    Sherman-Morrison on diag(1/p) + lamp m m': a block that mirrors a lamp keeps only what the lamp cannot imitate.
+    """
+    seen = precision * mirror
+    shrink = lamp / (1.0 + lamp * np.sum(seen * mirror, axis=1))
+    matrices = -shrink[:, None, None] * seen[:, :, None] * seen[:, None, :]
+    diagonal = np.arange(precision.shape[1])
+    matrices[:, diagonal, diagonal] += precision
+    return matrices
+
+
+def _next_lamps(
+    residual: Array, precision: Array, mirror: Array, lamp: Array, white: float
+) -> tuple[Array, Array]:
+    """What each block mirrors beside the smooth field, and the variance to grant it (a Student-t, block by block)."""
+    seen = np.sum(precision * mirror**2, axis=1)
+    spread = lamp / (1.0 + lamp * seen)
+    extra = spread * np.sum(precision * mirror * residual, axis=1)
+    ordinary = (_SPARKLE * white) ** 2
+    return extra, (_FREEDOM * ordinary + extra**2 + spread) / (_FREEDOM + 1.0)
 
 
 def _usable(means: BlockMeans, transfer: Array) -> NDArray[np.bool_]:
@@ -88,10 +135,16 @@ def _usable(means: BlockMeans, transfer: Array) -> NDArray[np.bool_]:
     return usable & means.valid[:, None]
 
 
-def _next_blur(blur: float, lit: Array, residual: Array, precision: Array, cycles_per_px: Array) -> float:
-    """One Gauss-Newton step on the blur's variance: d row / d blur = -2 pi^2 |m nu|^2 row."""
+def _next_nuisance(
+    last: Nuisance, lit: Array, lower: Array, residual: Array, precision: Array, means: BlockMeans
+) -> Nuisance:
+    """One Gauss-Newton step on each; d row / d blur = -2 pi^2 |m nu|^2 row, and the lower face enters linearly."""
     order = np.concatenate([[0.0], np.repeat(np.arange(1.0, lit.shape[1] // 2 + 1), 2)])
-    slope = -2.0 * np.pi**2 * np.sum(cycles_per_px**2, axis=1)[:, None] * order**2 * lit
+    slope = -2.0 * np.pi**2 * np.sum(means.cycles_per_px**2, axis=1)[:, None] * order**2 * lit
     power = np.sum(precision * slope**2)
-    step = np.sum(precision * slope * residual) / power if power > 0.0 else 0.0
-    return float(np.clip(blur + step, *_BLUR_RANGE_PX2))
+    blur = last.blur_variance_px2 + (np.sum(precision * slope * residual) / power if power > 0.0 else 0.0)
+    pull = (1.0 - last.lower_face) / _LOWER_FACE_SPREAD**2
+    face = last.lower_face + (np.sum(precision * lower * residual) + pull) / (
+        np.sum(precision * lower**2) + 1.0 / _LOWER_FACE_SPREAD**2
+    )
+    return Nuisance(float(np.clip(blur, *_BLUR_RANGE_PX2)), float(np.clip(face, 0.0, 1.5)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.channel_fit import ChannelFit, fit_channel
+from arlight.estimation.channel_fit import ChannelFit, Nuisance, fit_channel
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.normal_equations import BlockSystem
 from arlight.estimation.prior import color_stddev, prior_stddev
@@ -37,8 +37,8 @@ class Estimate:
     """Colour line of each block, for measuring the next frame."""
     reflection: Array
     """(blocks, 3) mirror reflection in the film's upper face [full scale]."""
-    blur_variance_px2: float
-    """Variance of the picture's blur as the stripes show it [px^2]."""
+    nuisance: Nuisance
+    """Blur and lower face as the stripes show them."""
 
 
 class LightingEstimator:
@@ -60,23 +60,22 @@ class LightingEstimator:
         self._basis = reflection_basis(np.array([block.center_mm for block in blocks], float).reshape(-1, 2))
         self._white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
 
-    def estimate(self, means: BlockMeans, time_s: float, blur_variance_px2: float = 0.4) -> Estimate:
+    def estimate(self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None) -> Estimate:
         """Lighting of one frame.
 
         Args:
             means: the frame's measurements.
             time_s: the frame's time [s].
-            blur_variance_px2: where to start the search for the blur [px^2].
+            nuisance: where to start, such as the last frame's.
 
         Returns:
             The estimate. Blocks that were not seen add nothing; with none at all the covariance is the prior's.
         """
         rows = self._response.light(means)
         white = self._white_level(means)
-        mirror = self._mirror_rows(means, white)
-        green = self._fit(means, rows, mirror, _GREEN, white, blur_variance_px2, None)
-        blur = green.blur_variance_px2
-        red, blue = (self._fit(means, rows, mirror, channel, white, blur, green) for channel in (0, 2))
+        lower = self._response.lower_mirror(means)
+        green = self._fit(means, rows, lower, _GREEN, white, nuisance or Nuisance(), None)
+        red, blue = (self._fit(means, rows, lower, channel, white, green.nuisance, green) for channel in (0, 2))
         fits = (red, green, blue)
         lighting = Lighting(
             self._frequencies,
@@ -86,7 +85,7 @@ class LightingEstimator:
             float(np.mean([fit.chi2 for fit in fits])),
         )
         reflection = np.stack([red.field, green.reflection, blue.field], axis=1)
-        return Estimate(lighting, _colors(fits, reflection, white), reflection, blur)
+        return Estimate(lighting, _colors(fits, reflection, white), reflection, green.nuisance)
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""
@@ -96,34 +95,15 @@ class LightingEstimator:
         patterned = means.values[self._patterned & means.valid, 0]
         return np.maximum(8.0 * np.median(patterned, axis=0), 1e-3) if len(patterned) else np.full(3, 0.5)
 
-    def _mirror_rows(self, means: BlockMeans, white: Array) -> Array:
-        """Rows (blocks, 7) of the reflection where the upper face alone gives 1 in the mean.
-
-        How much the lower face adds under clear film is read off the two kinds of black region; the prior, one face
-        more, gives way where there is a reflection to look at.
-        """
-        lower = self._response.lower_mirror(means)
-        upper = np.zeros_like(lower)
-        upper[:, 0] = 1.0
-        black, clear = self._black_film & means.valid, self._clear_black & means.valid
-        if np.count_nonzero(black) < 3 or not np.any(clear):
-            return upper + lower
-        level = np.median(means.values[black, 0] / white, axis=0)
-        excess = np.median(means.values[clear, 0] / white, axis=0) - level
-        weight = (level / (2.0 * _FIELD_FLOOR)) ** 2
-        seen = excess / np.maximum(level, 1e-6) / float(np.median(lower[clear, 0]))
-        strength = (1.0 + np.sum(weight * seen)) / (1.0 + np.sum(weight))
-        return upper + np.clip(strength, 0.0, 1.2) * lower
-
     def _fit(
-        self, means: BlockMeans, rows: Array, mirror: Array, channel: int, white: Array, blur: float,
+        self, means: BlockMeans, rows: Array, lower: Array, channel: int, white: Array, nuisance: Nuisance,
         green: ChannelFit | None,
     ) -> ChannelFit:  # fmt: skip
         level = float(white[channel])
         fresnel = self._slab.interface_reflectance(means.view_cosine)
         basis = self._basis * (fresnel / fresnel.mean())[:, None]
         black = (self._black_film | self._clear_black) & means.valid
-        amplitude = field_amplitude(means.values[black, 0, channel] / mirror[black, 0], _FIELD_FLOOR * level)
+        amplitude = field_amplitude(means.values[black, 0, channel], _FIELD_FLOOR * level)
         deviation = np.full(basis.shape[1], amplitude)
         deviation[0] = level
         if green is not None:
@@ -133,8 +113,11 @@ class LightingEstimator:
         spread = prior_stddev(self._frequencies, irradiance)
         expected = np.zeros_like(spread)
         if green is not None:
-            spread = color_stddev(self._frequencies, irradiance)
-            expected = green.packed * (level / white[_GREEN])
+            share = level / white[_GREEN]
+            expected = green.packed * share
+            spread = np.hypot(
+                color_stddev(self._frequencies, irradiance), share * np.sqrt(np.diagonal(green.covariance))
+            )
         system = BlockSystem(
             self._column,
             self._patterned,
@@ -142,7 +125,7 @@ class LightingEstimator:
             np.concatenate([expected, np.zeros_like(deviation)]),
             np.concatenate([spread, deviation]),
         )
-        return fit_channel(means, channel, level, rows, mirror, system, blur)
+        return fit_channel(means, channel, level, rows, lower, system, nuisance)
 
 
 def _colors(fits: tuple[ChannelFit, ...], reflection: Array, white: Array) -> BlockColors:

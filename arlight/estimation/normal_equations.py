@@ -36,23 +36,22 @@ class BlockSystem:
         """Solution (c + s,) and normal matrix (c + s, c + s) including the prior.
 
         Args:
-            design: (blocks, rows, 3); mirror, values, precision: (blocks, rows).
+            design: (blocks, rows, 3); mirror, values: (blocks, rows); precision: (blocks, rows, rows).
         """
         c, places, basis = self._coefficients, self._places, self._basis
-        weighted = design * precision[..., None]
-        own = np.einsum("brk,brl->bkl", weighted, design)
-        shared = np.einsum("brk,br->bk", weighted, mirror)
-        field = np.einsum("br,br,br->b", mirror, mirror, precision)
+        # one right-hand product a block: rows of the coefficients, of the field and of the values
+        wide = np.concatenate([design, mirror[..., None], values[..., None]], axis=2)
+        products = np.swapaxes(wide, 1, 2) @ (precision @ wide)
         normal = np.zeros((len(self._prior), len(self._prior)))
-        np.add.at(normal, (places[:, :, None], places[:, None, :]), own)
+        np.add.at(normal, (places[:, :, None], places[:, None, :]), products[:, :3, :3])
         cross = np.zeros((c, basis.shape[1]))
-        np.add.at(cross, places.ravel(), (shared[:, :, None] * basis[:, None, :]).reshape(-1, basis.shape[1]))
+        np.add.at(cross, places.ravel(), (products[:, :3, 3:4] * basis[:, None, :]).reshape(-1, basis.shape[1]))
         normal[:c, c:] = cross
         normal[c:, :c] = cross.T
-        normal[c:, c:] = (basis * field[:, None]).T @ basis
+        normal[c:, c:] = (basis * products[:, 3, 3][:, None]).T @ basis
         right = np.zeros(len(self._prior))
-        np.add.at(right, places, np.einsum("brk,br->bk", weighted, values))
-        right[c:] = np.einsum("br,br,br->b", mirror, values, precision) @ basis
+        np.add.at(right, places, products[:, :3, 4])
+        right[c:] = products[:, 3, 4] @ basis
         normal[np.diag_indices_from(normal)] += self._prior
         right += self._prior * self._expected
         return np.linalg.solve(normal, right), normal

@@ -11,28 +11,36 @@ _FLOOR = 0.002
 """Least standard deviation of a pixel, relative to white: quantisation to 8 bits."""
 _CORRELATION = 2.0
 """Pixels that codecs and demosaicing make alike count once."""
+_STRAY = 0.015
+"""Deviation of pixels from the fitted stripes that codec and noise explain, relative to white; what goes beyond is the
+image of a lamp in the film, which moves many pixels together."""
+_LAMP_PIXELS = 60.0
+"""How many pixels the image of a lamp moves together."""
 _MEAN_MODEL = 0.0012
 """Standard deviation of the model's error in a mean, relative to white."""
 _SWING_MODEL = 0.001
-"""The same in a harmonic."""
-_BLUR_MODEL = 0.005
-"""And in a harmonic that blur has all but removed."""
+"""The same in a harmonic that the pixels resolve well."""
+_CODEC = 0.012
+"""And in one at half the pixels' frequency, where codecs quantise coarsely; it grows with the frequency's square."""
 _COLOR_SPREAD = 0.2
 """How much the stripes' colour differs between blocks: error of a harmonic that was inferred from luma."""
 
 
-def row_variance(means: BlockMeans, channel: int, white: float, transfer: Array) -> Array:
+def row_variance(means: BlockMeans, channel: int, white: float) -> Array:
     """Variance (blocks, 7) of each row's error.
 
     Args:
         channel: 0, 1, 2 for red, green, blue.
         white: radiance of clear film on white paper in that channel.
-        transfer: (blocks, 7) what blur leaves of each row.
     """
     pixel = np.maximum(means.pixel_variance[:, channel], (_FLOOR * white) ** 2)
-    variance = _CORRELATION * np.diagonal(means.covariance, axis1=1, axis2=2) * pixel[:, None]
+    lamps = np.maximum(pixel - (_STRAY * white) ** 2, 0.0)
+    pixel = _CORRELATION * (pixel - lamps) + _LAMP_PIXELS * lamps
+    variance = np.diagonal(means.covariance, axis1=1, axis2=2) * pixel[:, None]
     variance[:, 0] += (_MEAN_MODEL * white) ** 2
-    variance[:, 1:] += (white * (_SWING_MODEL + _BLUR_MODEL * (1.0 - transfer[:, 1:]))) ** 2
+    order = np.repeat(np.arange(1.0, variance.shape[1] // 2 + 1), 2)
+    cycles = np.hypot(*means.cycles_per_px.T)[:, None] * order
+    variance[:, 1:] += (white * (_SWING_MODEL + _CODEC * (2.0 * cycles) ** 2)) ** 2
     if channel != 1:
         inferred = _COLOR_SPREAD * (1.0 - means.color_trust)
         swing = np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel])

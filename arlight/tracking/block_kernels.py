@@ -3,8 +3,10 @@
 import numpy as np
 from numba import njit
 
-MAX_COLUMNS = 9
-"""Columns of a block's fit: 1, x, y and the cosine and sine of three harmonics."""
+ROWS = 7
+"""What is kept of a block's fit: the mean, and cosine and sine of three harmonics."""
+MAX_COLUMNS = 16
+"""Columns of a block's fit at most: ten monomials of x and y up to degree 3, and the harmonics."""
 
 
 @njit(cache=True)
@@ -64,23 +66,29 @@ def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, pl
 
 
 @njit(cache=True)
-def fit(values, used, first, positions, phases, harmonics, coefficients, covariance, variance, samples):
-    """Least squares of each block's pixels on 1, x, y and its harmonics.
+def fit(values, used, first, positions, phases, harmonics, degree, coefficients, covariance, variance, samples):
+    """Least squares of each block's pixels on its harmonics and a polynomial of x and y.
 
     Args:
         values: (n, r) one row a pixel; used: (n,) False for pixels to leave out.
-        harmonics: (b,) how many harmonics to fit.
+        harmonics: (b,) how many harmonics to fit; degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
 
-    Fills coefficients (b, 9, r), covariance (b, 9, 9) for unit variance, variance (b, r) of a pixel about the fit,
-    samples (b,); blocks with too few pixels get 0 samples.
+    Fills coefficients (b, 7, r) and their covariance (b, 7, 7) for unit variance, variance (b, r) of a pixel about the
+    fit, samples (b,); blocks with too few pixels get 0 samples. The polynomial's constant is the mean over the middle
+    of the block's symmetric window, which is what the block's mean is without stripes.
     """
     rights = values.shape[1]
     normal = np.empty((MAX_COLUMNS, MAX_COLUMNS))
+    inverse = np.empty((MAX_COLUMNS, MAX_COLUMNS))
     right = np.empty((MAX_COLUMNS, rights))
     squares = np.empty(rights)
     row = np.empty(MAX_COLUMNS)
+    solved = np.empty(MAX_COLUMNS)
     for block in range(first.shape[0] - 1):
-        columns = 3 + 2 * harmonics[block]
+        if degree[block] == 0:
+            continue
+        kept = 1 + 2 * harmonics[block]
+        columns = kept + (degree[block] + 1) * (degree[block] + 2) // 2 - 1
         normal[:] = 0.0
         right[:] = 0.0
         squares[:] = 0.0
@@ -88,7 +96,7 @@ def fit(values, used, first, positions, phases, harmonics, coefficients, covaria
         for i in range(first[block], first[block + 1]):
             if not used[i]:
                 continue
-            _fill_row(row, positions[i, 0], positions[i, 1], phases[i], harmonics[block])
+            _fill_row(row, positions[i, 0], positions[i, 1], phases[i], harmonics[block], degree[block])
             for a in range(columns):
                 for b in range(a + 1):
                     normal[a, b] += row[a] * row[b]
@@ -101,33 +109,45 @@ def fit(values, used, first, positions, phases, harmonics, coefficients, covaria
         covariance[block] = 0.0
         variance[block] = 0.0
         samples[block] = 0
-        if count < 2 * columns or not _invert(normal, columns, covariance[block]):
+        if count < 2 * columns or not _invert(normal, columns, inverse):
             continue
         samples[block] = count
+        covariance[block, :kept, :kept] = inverse[:kept, :kept]
         for c in range(rights):
             explained = 0.0
             for a in range(columns):
-                total = 0.0
+                solved[a] = 0.0
                 for b in range(columns):
-                    total += covariance[block, a, b] * right[b, c]
-                coefficients[block, a, c] = total
-                explained += total * right[a, c]
+                    solved[a] += inverse[a, b] * right[b, c]
+                explained += solved[a] * right[a, c]
+            coefficients[block, :kept, c] = solved[:kept]
             variance[block, c] = max(squares[c] - explained, 0.0) / (count - columns)
 
 
 @njit(cache=True)
-def _fill_row(row, x, y, phase, harmonics):
+def _fill_row(row, x, y, phase, harmonics, degree):
+    """1, the harmonics, then monomials of rising degree; even ones less their mean over the square."""
     row[0] = 1.0
-    row[1] = x
-    row[2] = y
-    if harmonics == 0:
-        return
-    c1, s1 = np.cos(phase), np.sin(phase)
-    c, s = c1, s1
-    for m in range(harmonics):
-        row[3 + 2 * m] = c
-        row[4 + 2 * m] = s
-        c, s = c * c1 - s * s1, s * c1 + c * s1
+    at = 1
+    if harmonics > 0:
+        c1, s1 = np.cos(phase), np.sin(phase)
+        c, s = c1, s1
+        for _ in range(harmonics):
+            row[at] = c
+            row[at + 1] = s
+            c, s = c * c1 - s * s1, s * c1 + c * s1
+            at += 2
+    row[at] = x
+    row[at + 1] = y
+    if degree > 1:
+        row[at + 2] = x * x - 1.0 / 3.0
+        row[at + 3] = x * y
+        row[at + 4] = y * y - 1.0 / 3.0
+    if degree > 2:
+        row[at + 5] = x * x * x
+        row[at + 6] = x * x * y
+        row[at + 7] = x * y * y
+        row[at + 8] = y * y * y
 
 
 @njit(cache=True)

@@ -4,6 +4,8 @@ Each pixel is used once, as it was decoded. Its film point q and paper point q -
 block; the pattern's phase at q is known, so one small least-squares fit a block separates mean and harmonics.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,7 @@ from arlight.probe.design import Probe
 from arlight.tracking import block_kernels as kernels
 from arlight.tracking.block_color import chroma_correction, color_lines
 from arlight.tracking.block_layout import BlockLayout, BlockView, field_blocks
-from arlight.tracking.block_means import BlockColors, BlockMeans
+from arlight.tracking.block_means import ROWS, BlockColors, BlockMeans
 from arlight.video.conversion import decoding_table
 from arlight.video.frame import Frame
 
@@ -22,8 +24,8 @@ _CLIP = 0.975
 """Encoded value from which a pixel counts as clipped: codecs ring around true white."""
 _UNCLIPPED_SHARE = 0.7
 _MIN_SAMPLES = 24
-_KEPT = np.array([0, 3, 4, 5, 6, 7, 8])
-"""Columns of the fit that are measurements; 1 and 2 are the block's shading along x and y."""
+_LAMP_DEVIATION = 0.02
+"""Deviation of a block's pixels from its stripes, relative to the brightest block, that means a lamp in the film [-]."""
 _UNRESOLVED_BLUR_PX = 0.6
 
 
@@ -125,8 +127,9 @@ class BlockMeter:
         expected = self._chroma[:count, 2:]
         kernels.expected_chroma(self._encoded, self._first, luma, chroma, expected)
         first_harmonic = np.minimum(view.harmonics, 1)
-        fitted, _, _, _ = self._solve(self._chroma, first_harmonic, None)
-        swing = fitted[:, 3] - 1j * fitted[:, 4]
+        self._used[:count] = True
+        fitted = self._solve(self._chroma, first_harmonic).coefficients
+        swing = fitted[:, 1] - 1j * fitted[:, 2]
         mean = np.empty((len(self._patterned), 4))
         kernels.block_average(self._chroma[:count], self._first, mean)
         correction = chroma_correction(swing[:, :2], swing[:, 2:], mean[:, :2] - mean[:, 2:], view.cycles_per_px)
@@ -147,36 +150,54 @@ class BlockMeter:
         ones = np.ones((len(average), 1))
         return BlockColors(ones * np.maximum(dark, 1e-5), ones * np.maximum(bright - dark, 1e-4))
 
-    def _solve(
-        self, values: Array, harmonics: NDArray[np.int64], used: NDArray[np.bool_] | None
-    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        blocks = len(harmonics)
-        coefficients = np.empty((blocks, kernels.MAX_COLUMNS, values.shape[1]))
-        covariance = np.empty((blocks, kernels.MAX_COLUMNS, kernels.MAX_COLUMNS))
-        variance = np.empty((blocks, values.shape[1]))
-        samples = np.empty(blocks, np.int64)
-        if used is None:
-            self._used[:] = True
+    def _solve(self, values: Array, harmonics: NDArray[np.int64]) -> "_Fit":
+        """Fit all blocks with a linear shading."""
+        fit = _Fit.empty(len(harmonics), values.shape[1])
+        self._refine(fit, values, harmonics, np.ones_like(harmonics))
+        return fit
+
+    def _refine(self, fit: "_Fit", values: Array, harmonics: NDArray[np.int64], degree: NDArray[np.int64]) -> None:
         kernels.fit(
-            values, self._used, self._first, self._positions, self._phases, harmonics, coefficients, covariance,
-            variance, samples,
+            values, self._used, self._first, self._positions, self._phases, harmonics, degree, fit.coefficients,
+            fit.covariance, fit.variance, fit.samples,
         )  # fmt: skip
-        return coefficients, covariance, variance, samples
 
     def _fit(self, view: BlockView, trust: Array) -> BlockMeans:
-        coefficients, covariance, variance, samples = self._solve(self._linear, view.harmonics, self._used)
+        fit = self._solve(self._linear, view.harmonics)
+        brightest = float(fit.coefficients[:, 0].max(initial=1e-6))
+        lamps = np.sqrt(fit.variance.max(axis=1)) > _LAMP_DEVIATION * brightest
+        self._refine(fit, self._linear, view.harmonics, np.where(lamps, 3, 0))
         gathered = np.diff(self._first)
-        valid = (samples >= _MIN_SAMPLES) & (samples >= _UNCLIPPED_SHARE * gathered)
+        valid = (fit.samples >= _MIN_SAMPLES) & (fit.samples >= _UNCLIPPED_SHARE * gathered)
         views = self._views / np.maximum(gathered, 1)[:, None]
         return BlockMeans(
-            values=coefficients[:, _KEPT],
-            covariance=covariance[:, _KEPT][:, :, _KEPT],
-            pixel_variance=variance,
-            harmonics=np.where(samples > 0, view.harmonics, 0),
-            samples=samples,
+            values=fit.coefficients,
+            covariance=fit.covariance,
+            pixel_variance=fit.variance,
+            harmonics=np.where(fit.samples > 0, view.harmonics, 0),
+            samples=fit.samples,
             valid=valid,
             view_phasor=views[:, 0] - 1j * views[:, 1],
             view_cosine=np.where(gathered > 0, views[:, 2], 1.0),
             cycles_per_px=view.cycles_per_px,
             color_trust=trust,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Output buffers of the compiled fit."""
+
+    coefficients: Array
+    covariance: Array
+    variance: Array
+    samples: NDArray[np.int64]
+
+    @classmethod
+    def empty(cls, blocks: int, channels: int) -> "_Fit":
+        return cls(
+            np.zeros((blocks, ROWS, channels)),
+            np.zeros((blocks, ROWS, ROWS)),
+            np.zeros((blocks, channels)),
+            np.zeros(blocks, np.int64),
         )
