@@ -32,14 +32,15 @@ _RUN: dict[type, Callable[[Any], int]] = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0, 1 for what the user can mend, 2 for usage, 130 for Ctrl-C."""
-    options: Any = tyro.cli(
-        Command,  # type: ignore[arg-type]
-        prog="arlight",
-        args=arguments,
-        description="Light virtual objects in footage with the light that is really there, measured from a printed sheet.",
-    )
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     try:
+        options: Any = tyro.cli(
+            Command,  # type: ignore[arg-type]
+            prog="arlight",
+            args=arguments,
+            description="Light virtual objects in footage with the light that is really there, "
+            "measured from a printed sheet.",
+        )
         return _RUN[type(options)](options)
     except ArlightError as error:
         errors.print(f"arlight: {error}")

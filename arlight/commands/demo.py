@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -21,7 +21,7 @@ from arlight.probe.layout import design_probe
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.statistics import RunStatistics
-from arlight.synthetic.light_script import ScriptName
+from arlight.synthetic.captured import load_environment
 from arlight.synthetic.motion import PathName
 from arlight.synthetic.settings import SynthesisSettings
 from arlight.synthetic.synthesis import synthesize
@@ -44,8 +44,8 @@ class DemoOptions:
     """Length of the video [s]."""
     environment: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "hall"
     """Captured light: the name of one that comes with arlight, or a latitude-longitude .hdr or .exr file."""
-    light: ScriptName = "turn"
-    """still, or turn: the light turns about the zenith."""
+    light: Literal["still", "turn"] = "turn"
+    """The light stands still, or turns about the zenith."""
     path: PathName = "orbit"
     """How the camera moves."""
     order: int = 5
@@ -68,6 +68,8 @@ def run(options: DemoOptions) -> int:
     settings = SynthesisSettings(
         environment=options.environment, light=options.light, path=options.path, duration_s=options.seconds
     )
+    # refused before the object is prepared, which takes seconds
+    load_environment(options.environment)
     probe = design_probe(options.order)
     relighter = make_relighter(options.relighting, probe, settings.filming_camera)
     pipeline = Pipeline(probe, settings.filming_camera, relighter)

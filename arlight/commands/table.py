@@ -10,6 +10,7 @@ from rich.table import Table
 
 from arlight.benchmark.accuracy import AccuracyCell, AccuracySettings, accuracy_table
 from arlight.probe.layout import design_probe
+from arlight.synthetic.captured import load_environment
 from arlight.synthetic.settings import SynthesisSettings
 
 
@@ -45,6 +46,8 @@ def run(options: TableOptions) -> int:
         frames=options.frames,
         footage=SynthesisSettings(environment=options.environment, path="still"),
     )
+    # refused before the sheet is drawn, which takes seconds
+    load_environment(options.environment)
     probe = design_probe(options.order)
     console = Console(soft_wrap=True, highlight=False)
     cells = []
