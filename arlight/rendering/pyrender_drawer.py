@@ -7,7 +7,7 @@ when it lets its context go it terminates the EGL display that every other conte
 import os
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -163,6 +163,7 @@ def _destroy_context(platform: Any) -> None:
 def _current_context_kept() -> Iterator[None]:
     """Make the EGL context that was current before current again: pyrender leaves its own."""
     from OpenGL import EGL
+    from OpenGL.error import GLError
 
     display, context = EGL.eglGetCurrentDisplay(), EGL.eglGetCurrentContext()
     draw, read = EGL.eglGetCurrentSurface(EGL.EGL_DRAW), EGL.eglGetCurrentSurface(EGL.EGL_READ)
@@ -170,7 +171,9 @@ def _current_context_kept() -> Iterator[None]:
         yield
     finally:
         if context:
-            EGL.eglMakeCurrent(display, draw, read, context)
+            # a context that its owner has destroyed meanwhile stays current by name only
+            with suppress(GLError):
+                EGL.eglMakeCurrent(display, draw, read, context)
 
 
 def _primitives(pyrender: Any, mesh: Mesh, roughness: float) -> list[Any]:

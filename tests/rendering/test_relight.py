@@ -1,0 +1,175 @@
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from arlight.rendering.default_object import default_object
+from arlight.rendering.mesh import Mesh
+from arlight.rendering.mesh_file import from_trimesh
+from arlight.rendering.relight import Relighter, RelightSettings
+from arlight.synthetic.captured import load_environment
+from arlight.video.frame import Frame
+
+pytestmark = pytest.mark.usefixtures("gl")
+
+QUICK = RelightSettings(directions=96, shadow_texels=48)
+
+
+def frame_of(value=128, size=(320, 240)):
+    rng = np.random.default_rng(8)
+    image = rng.integers(value - 20, value + 20, (size[1], size[0], 3)).astype(np.uint8)
+    return Frame.from_rgb(image)
+
+
+@pytest.fixture(scope="module")
+def relighter(probe, camera):
+    return Relighter(default_object(), probe, camera, QUICK)
+
+
+@pytest.mark.parametrize("name", ["apartment", "bridge", "hall"])
+def test_a_white_matte_card_has_the_radiance_of_the_paper(probe, camera, pose, lighting_of, name):
+    """The paper's frame reflects 0.9/pi of the environment's own irradiance; the card is lit by coefficients only."""
+    environment = load_environment(name).scaled(0.2)
+    plate = from_trimesh(trimesh.creation.box(extents=(40.0, 40.0, 0.3)))
+    white = replace(plate, base_colour=np.full_like(plate.base_colour, 0.9))
+    settings = RelightSettings(size_mm=40.0, normal_reflectance=0.0, directions=96, shadow_texels=32)
+    relighter = Relighter(white, probe, camera, settings)
+    region, image = relighter.draw_object(pose, lighting_of(environment))
+    x, y = np.rint(camera.project(pose, [[0.0, 0.0, 0.3]])[0]).astype(int)
+    card = image[y - region.y0 - 4 : y - region.y0 + 5, x - region.x0 - 4 : x - region.x0 + 5]
+    assert np.all(card[..., 3] == 1.0)
+    paper = 0.9 / np.pi * environment.irradiance()
+    assert np.allclose(card[..., :3].mean(axis=(0, 1)), paper, rtol=0.02)
+
+
+def test_the_card_s_radiance_reaches_the_frame(probe, camera, pose, lighting_of):
+    environment = load_environment("bridge")
+    environment = environment.scaled(0.5 * np.pi / environment.irradiance().max())
+    plate = from_trimesh(trimesh.creation.box(extents=(40.0, 40.0, 0.3)))
+    white = replace(plate, base_colour=np.full_like(plate.base_colour, 0.9))
+    settings = RelightSettings(size_mm=40.0, normal_reflectance=0.0, directions=96, shadow_texels=32)
+    relighter = Relighter(white, probe, camera, settings)
+    lighting = lighting_of(environment)
+    relit = relighter.render(frame_of(), pose, lighting)
+    _, image = relighter.draw_object(pose, lighting)
+    x, y = np.rint(camera.project(pose, [[0.0, 0.0, 0.3]])[0]).astype(int)
+    region, _ = relighter.draw_object(pose, lighting)
+    # 8-bit sRGB: half a level is 0.4 % here
+    assert np.allclose(relit.linear_rgb()[y, x], image[y - region.y0, x - region.x0, :3], rtol=0.006)
+
+
+def test_only_the_object_and_its_shadow_change(relighter, pose, lighting_of, environment):
+    frame = frame_of()
+    lighting = lighting_of(environment)
+    relit = relighter.render(frame, pose, lighting)
+    assert relit.size == frame.size
+    before, after = frame.linear_rgb(), relit.linear_rgb()
+    region, image = relighter.draw_object(pose, lighting)
+    covered = np.zeros(before.shape[:2], bool)
+    covered[region.y0 : region.y1, region.x0 : region.x1] = image[..., 3] > 0
+    assert np.all(after[~covered] <= before[~covered] + 1e-6)
+    # far from the object nothing is touched, bit by bit
+    far = np.zeros(before.shape[:2], bool)
+    far[:10], far[:, :20], far[:, -20:] = True, True, True
+    for mine, theirs in zip(relit.planes, frame.planes, strict=True):
+        assert np.array_equal(mine[far], theirs[far])
+    shaded = (after < before - 0.01).all(axis=2) & ~covered
+    assert np.count_nonzero(shaded) > 200
+
+
+def test_the_input_frame_stays_as_it_was(relighter, pose, lighting_of, environment):
+    frame = frame_of()
+    copies = [plane.copy() for plane in frame.planes]
+    relighter.render(frame, pose, lighting_of(environment))
+    assert all(np.array_equal(plane, copy) for plane, copy in zip(frame.planes, copies, strict=True))
+
+
+def test_no_pose_or_no_light_leaves_the_frame(relighter, pose, lighting_of, environment):
+    frame = frame_of()
+    assert relighter.render(frame, None, lighting_of(environment)) is frame
+    assert relighter.render(frame, pose, None) is frame
+
+
+def test_a_sheet_out_of_the_picture_leaves_the_frame(relighter, pose, lighting_of, environment):
+    frame = frame_of()
+    aside = replace(pose, translation=pose.translation + [4000.0, 0.0, 0.0])
+    assert relighter.render(frame, aside, lighting_of(environment)) is frame
+
+
+@pytest.mark.parametrize("shift", [(110.0, 0.0), (0.0, 85.0), (-100.0, -80.0)])
+def test_an_object_half_out_of_the_picture_is_cut_at_its_edge(relighter, camera, pose, lighting_of, environment, shift):
+    frame, lighting = frame_of(), lighting_of(environment)
+    aside = replace(pose, translation=pose.translation + [*shift, 0.0])
+    region, image = relighter.draw_object(aside, lighting)
+    assert region.clipped(camera.image_size) == region
+    assert image[..., 3].max() == 1.0
+    relit = relighter.render(frame, aside, lighting)
+    drawn = relit.linear_rgb(region)
+    solid = image[..., 3] == 1.0
+    assert np.allclose(drawn[solid], np.clip(image[..., :3], 0, 1)[solid], atol=0.01)
+
+
+def test_light_is_linear(relighter, pose, lighting_of):
+    one, other = lighting_of(load_environment("apartment")), lighting_of(load_environment("bridge"))
+    both = replace(one, coefficients=0.5 * one.coefficients + 2.0 * other.coefficients)
+    images = [relighter.draw_object(pose, light)[1][..., :3] for light in (one, other, both)]
+    difference = np.abs(images[2] - 0.5 * images[0] - 2.0 * images[1])
+    # exact but where the reconstructed light is negative: there the drawing clamps it
+    assert np.quantile(difference, 0.9) < 1e-5
+    assert difference.max() < 0.03 * images[2].max()
+
+
+def test_a_lens_bends_object_and_shadow_alike(probe, lens_camera, pose, lighting_of, environment):
+    relighter = Relighter(default_object(), probe, lens_camera, QUICK)
+    relit = relighter.render(frame_of(), pose, lighting_of(environment))
+    region, image = relighter.draw_object(pose, lighting_of(environment))
+    pixels = lens_camera.project(pose, relighter.mesh.vertices_mm)
+    y, x = np.nonzero(image[..., 3] == 1.0)
+    assert abs((x + region.x0).max() - pixels[:, 0].max()) < 1.5
+    assert abs((y + region.y0).min() - pixels[:, 1].min()) < 1.5
+    assert relit is not None
+
+
+def test_other_frequencies_and_sizes_are_refused(relighter, pose, lighting_of, environment):
+    lighting = lighting_of(environment)
+    fewer = replace(lighting, frequencies=lighting.frequencies[:5], coefficients=lighting.coefficients[:5])
+    with pytest.raises(ValueError, match="frequencies"):
+        relighter.render(frame_of(), pose, fewer)
+    with pytest.raises(ValueError, match="pixels"):
+        relighter.render(frame_of(size=(64, 48)), pose, lighting)
+
+
+def test_made_in_one_thread_and_used_in_another(probe, camera, pose, lighting_of, environment):
+    relighter = Relighter(default_object(), probe, camera, QUICK)
+    results = []
+
+    def work():
+        results.append(relighter.draw_object(pose, lighting_of(environment)))
+        relighter.release()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    here = relighter.draw_object(pose, lighting_of(environment))
+    assert np.allclose(results[0][1], here[1], atol=1e-6)
+
+
+def test_a_grey_frame_gets_a_coloured_object(relighter, pose, lighting_of, environment):
+    colour = frame_of()
+    from arlight.video.pixel_format import PixelFormat
+
+    grey = Frame(0, 0.0, (colour.planes[0],), PixelFormat("gray", True, 8))
+    relit = relighter.render(grey, pose, lighting_of(environment))
+    assert len(relit.planes) == 3
+
+
+@pytest.mark.parametrize("vertices", [3, 4])
+def test_a_flat_or_tiny_object_can_be_lit(probe, camera, pose, lighting_of, environment, vertices):
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])[:vertices]
+    faces = np.array([[0, 1, 2], [2, 1, 3]], np.int32)[: vertices - 2]
+    mesh = Mesh(corners, np.tile([0.0, 0.0, 1.0], (vertices, 1)), faces, np.full((vertices, 3), 0.5, np.float32))
+    relighter = Relighter(mesh, probe, camera, QUICK)
+    relit = relighter.render(frame_of(), pose, lighting_of(environment))
+    assert np.all(np.isfinite(relit.linear_rgb()))
