@@ -57,7 +57,14 @@ class ChannelFit:
 
 
 def fit_channel(
-    means: BlockMeans, channel: int, white: float, rows: Array, lower: Array, system: BlockSystem, nuisance: Nuisance
+    means: BlockMeans,
+    channel: int,
+    white: float,
+    rows: Array,
+    lower: Array,
+    mean_model: Array,
+    system: BlockSystem,
+    nuisance: Nuisance,
 ) -> ChannelFit:
     """Fit one channel.
 
@@ -67,11 +74,12 @@ def fit_channel(
         white: radiance of clear film on white paper.
         rows: (blocks, 7, 3) response before blur; lower: (blocks, 7) what the lower face mirrors where the upper
             face mirrors 1.
+        mean_model: (blocks,) error of the model in the means, relative to white.
         system: gathers and solves the normal equations.
         nuisance: first guess.
     """
     values = means.values[:, :, channel]
-    variance = row_variance(means, channel, white)
+    variance = row_variance(means, channel, white, mean_model)
     weights = np.ones_like(values)
     lamp = np.full(len(values), (_FIRST_SPARKLE * white) ** 2)
     for _ in range(_ITERATIONS):
@@ -116,9 +124,7 @@ def _without_lamps(precision: Array, mirror: Array, lamp: Array) -> Array:
     return matrices
 
 
-def _next_lamps(
-    residual: Array, precision: Array, mirror: Array, lamp: Array, white: float
-) -> tuple[Array, Array]:
+def _next_lamps(residual: Array, precision: Array, mirror: Array, lamp: Array, white: float) -> tuple[Array, Array]:
     """What each block mirrors beside the smooth field, and the variance to grant it (a Student-t, block by block)."""
     seen = np.sum(precision * mirror**2, axis=1)
     spread = lamp / (1.0 + lamp * seen)

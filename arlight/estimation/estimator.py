@@ -15,6 +15,7 @@ from arlight.estimation.normal_equations import BlockSystem
 from arlight.estimation.prior import color_stddev, prior_stddev
 from arlight.estimation.reflection import field_amplitude, reflection_basis
 from arlight.estimation.response import BlockResponse
+from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import unpack_real
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
@@ -56,6 +57,7 @@ class LightingEstimator:
         self._white = kinds == "clear_white"
         self._black_film = np.isin(kinds, ["black_white", "black_black"])
         self._clear_black = kinds == "clear_black"
+        self._mean_model = np.where(self._white, WHITE_MODEL, MEAN_MODEL)
         self._column = np.array([index[block.frequency] if block.frequency else 0 for block in blocks])
         self._basis = reflection_basis(np.array([block.center_mm for block in blocks], float).reshape(-1, 2))
         self._white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
@@ -125,7 +127,7 @@ class LightingEstimator:
             np.concatenate([expected, np.zeros_like(deviation)]),
             np.concatenate([spread, deviation]),
         )
-        return fit_channel(means, channel, level, rows, lower, system, nuisance)
+        return fit_channel(means, channel, level, rows, lower, self._mean_model, system, nuisance)
 
 
 def _colors(fits: tuple[ChannelFit, ...], reflection: Array, white: Array) -> BlockColors:

@@ -7,7 +7,7 @@ from arlight.fourier import frequency_order
 
 _RELATIVE_SPREAD = 0.35
 """Standard deviation of Re and Im of L~_n relative to L~_0 at order 1, over twelve captured environments."""
-_COLOR_SPREAD = 0.06
+_COLOR_SPREAD = 0.08
 """The same of the difference between red or blue and green, each relative to its own L~_0."""
 _MEAN_SPREAD = 10.0
 """Standard deviation of L~_0: three times a hemisphere of full-scale radiance [radiance * sr]."""

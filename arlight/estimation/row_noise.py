@@ -16,8 +16,10 @@ _STRAY = 0.015
 image of a lamp in the film, which moves many pixels together."""
 _LAMP_PIXELS = 60.0
 """How many pixels the image of a lamp moves together."""
-_MEAN_MODEL = 0.0012
-"""Standard deviation of the model's error in a mean, relative to white."""
+MEAN_MODEL = 0.0012
+"""Standard deviation of the model's error in a patterned or black block's mean, relative to white."""
+WHITE_MODEL = 0.01
+"""The same for white blocks, whose bounced light comes in part from darker neighbours."""
 _SWING_MODEL = 0.001
 """The same in a harmonic that the pixels resolve well."""
 _CODEC = 0.012
@@ -26,18 +28,19 @@ _COLOR_SPREAD = 0.2
 """How much the stripes' colour differs between blocks: error of a harmonic that was inferred from luma."""
 
 
-def row_variance(means: BlockMeans, channel: int, white: float) -> Array:
+def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Array) -> Array:
     """Variance (blocks, 7) of each row's error.
 
     Args:
         channel: 0, 1, 2 for red, green, blue.
         white: radiance of clear film on white paper in that channel.
+        mean_model: (blocks,) standard deviation of the model's error in the mean, relative to white.
     """
     pixel = np.maximum(means.pixel_variance[:, channel], (_FLOOR * white) ** 2)
     lamps = np.maximum(pixel - (_STRAY * white) ** 2, 0.0)
     pixel = _CORRELATION * (pixel - lamps) + _LAMP_PIXELS * lamps
     variance = np.diagonal(means.covariance, axis1=1, axis2=2) * pixel[:, None]
-    variance[:, 0] += (_MEAN_MODEL * white) ** 2
+    variance[:, 0] += (mean_model * white) ** 2
     order = np.repeat(np.arange(1.0, variance.shape[1] // 2 + 1), 2)
     cycles = np.hypot(*means.cycles_per_px.T)[:, None] * order
     variance[:, 1:] += (white * (_SWING_MODEL + _CODEC * (2.0 * cycles) ** 2)) ** 2

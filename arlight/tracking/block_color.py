@@ -17,8 +17,8 @@ from arlight.tracking.block_means import BlockColors
 Array = NDArray[np.float64]
 
 _LINE_NODES = 24
-_NOISE_TO_SWING = 0.1
-"""Variance of chroma's error over that of the colour swing it should show: half a level against two."""
+_NOISE_TO_SWING = 0.03
+"""Variance of chroma's error over that of the colour swing it should show: half a level against three."""
 _PRIOR_VARIANCE_PX2 = 1.5
 _PRIOR_SHIFT_PX = 0.3
 

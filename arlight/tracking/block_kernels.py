@@ -71,7 +71,8 @@ def fit(values, used, first, positions, phases, harmonics, degree, coefficients,
 
     Args:
         values: (n, r) one row a pixel; used: (n,) False for pixels to leave out.
-        harmonics: (b,) how many harmonics to fit; degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
+        harmonics: (b,) how many harmonics to fit.
+        degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
 
     Fills coefficients (b, 7, r) and their covariance (b, 7, 7) for unit variance, variance (b, r) of a pixel about the
     fit, samples (b,); blocks with too few pixels get 0 samples. The polynomial's constant is the mean over the middle

@@ -25,7 +25,7 @@ _CLIP = 0.975
 _UNCLIPPED_SHARE = 0.7
 _MIN_SAMPLES = 24
 _LAMP_DEVIATION = 0.02
-"""Deviation of a block's pixels from its stripes, relative to the brightest block, that means a lamp in the film [-]."""
+"""Deviation of a block's pixels from its stripes, relative to the brightest block, that means a lamp in the film."""
 _UNRESOLVED_BLUR_PX = 0.6
 
 

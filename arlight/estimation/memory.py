@@ -1,0 +1,73 @@
+"""A Kalman filter with fading memory: what is older than its memory counts less and less, at any frame rate."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class FadingMemory:
+    """Averages vectors with their covariances over a memory; with a trend it also follows a steady change.
+
+    Dividing the covariance by exp(-dt/memory) at every step is the Kalman filter whose process noise keeps the balance
+    between old and new the same whatever the measurements' covariance is; several channels are filtered at once.
+    """
+
+    def __init__(self, memory_s: float, *, trend: bool) -> None:
+        """Choose a memory [s] and whether the vectors have a velocity."""
+        self._memory_s = memory_s
+        self._trend = trend
+
+    def start(self, values: Array, covariance: Array, rate: Array) -> None:
+        """Begin with values (c, n), their covariance (c, n, n) and the spread (c, n) of velocities [1/s]."""
+        self.values = values.copy()
+        self.covariance = covariance.copy()
+        self.velocity = np.zeros_like(values)
+        self._cross = np.zeros_like(covariance)
+        self._moving = np.zeros_like(covariance)
+        diagonal = np.arange(values.shape[1])
+        self._moving[:, diagonal, diagonal] = rate**2 if self._trend else 0.0
+
+    def predict(self, dt: float, ceiling: Array) -> None:
+        """Carry the state on by dt [s]; its variance grows up to `ceiling` (c, n) and no further."""
+        growth = float(np.exp(min(dt / self._memory_s, 50.0)))
+        if self._trend:
+            self.values += dt * self.velocity
+            self.covariance = (
+                self.covariance + dt * (self._cross + np.swapaxes(self._cross, 1, 2)) + dt**2 * self._moving
+            )
+            self._cross = (self._cross + dt * self._moving) * growth
+            self._moving = self._moving * growth
+        self.covariance = self.covariance * growth
+        self._shrink_to(ceiling)
+
+    def correct(self, values: Array, covariance: Array) -> None:
+        """Take in a measurement (c, n) with covariance (c, n, n)."""
+        innovation = values - self.values
+        total = self.covariance + covariance
+        joint = np.concatenate([self.covariance, self._cross], axis=2) if self._trend else self.covariance
+        gain = np.linalg.solve(total, joint)
+        change = np.einsum("cij,ci->cj", gain, innovation)
+        size = values.shape[1]
+        to_values = gain[:, :, :size]
+        self.values += change[:, :size]
+        if self._trend:
+            to_velocity = gain[:, :, size:]
+            self.velocity += change[:, size:]
+            self._moving = _symmetric(self._moving - np.swapaxes(self._cross, 1, 2) @ to_velocity)
+            self._cross = self._cross - self.covariance @ to_velocity
+        self.covariance = _symmetric(self.covariance - self.covariance @ to_values)
+
+    def _shrink_to(self, ceiling: Array) -> None:
+        variance = np.einsum("cii->ci", self.covariance)
+        scale = np.sqrt(np.minimum(1.0, ceiling / np.maximum(variance, 1e-30)))
+        if np.all(scale == 1.0):
+            return
+        # scaling rows and columns keeps the joint matrix positive semidefinite
+        self.covariance = self.covariance * scale[:, :, None] * scale[:, None, :]
+        self._cross = self._cross * scale[:, :, None] * scale[:, None, :]
+        self._moving = self._moving * scale[:, :, None] * scale[:, None, :]
+
+
+def _symmetric(matrices: Array) -> Array:
+    return 0.5 * (matrices + np.swapaxes(matrices, 1, 2))
