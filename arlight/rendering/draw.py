@@ -48,10 +48,7 @@ class ObjectRenderer:
         self._context = create_context()
         # the viewport's rows run downward, which turns every triangle's winding round
         self._context.front_face = "cw"
-        textured = mesh.textures is not None
-        self._program = self._context.program(
-            vertex_shader=_variant("object.vert", textured), fragment_shader=_variant("object.frag", textured)
-        )
+        self._program = self._compiled(mesh.textures is not None)
         self._set("roughness", roughness)
         self._set("normal_reflectance", normal_reflectance)
         self._set("gloss", 0)
@@ -60,20 +57,7 @@ class ObjectRenderer:
         self._textures = self._upload_textures(mesh.textures) if mesh.textures is not None else None
         self._clip = self._context.buffer(reserve=16 * len(mesh.vertices_mm), dynamic=True)
         self._diffuse = self._context.buffer(reserve=12 * len(mesh.vertices_mm), dynamic=True)
-        self._triangles = self._context.vertex_array(
-            self._program,
-            [
-                (self._clip, "4f", "clip"),
-                (self._diffuse, "3f", "diffuse_radiance"),
-                (
-                    self._context.buffer(_static_attributes(mesh, transfer.openness)),
-                    "3f 3f 3f 3f 3f 3f" + textured * " 3f",
-                    *("position_mm", "normal", "base_colour", "openness_0", "openness_1", "openness_2"),
-                    *(("texture_place",) if textured else ()),
-                ),
-            ],
-            self._context.buffer(np.ascontiguousarray(mesh.faces, np.int32)),
-        )
+        self._triangles = self._vertex_array(mesh)
         self._target: moderngl.Framebuffer | None = None
 
     def draw(self, view: View, packed: NDArray[np.float32]) -> Image:
@@ -115,6 +99,27 @@ class ObjectRenderer:
     def release(self) -> None:
         """Give the context back; the renderer cannot be used after."""
         self._context.release()
+
+    def _compiled(self, textured: bool) -> moderngl.Program:
+        return self._context.program(
+            vertex_shader=_variant("object.vert", textured), fragment_shader=_variant("object.frag", textured)
+        )
+
+    def _vertex_array(self, mesh: Mesh) -> moderngl.VertexArray:
+        """What changes with the frame in two buffers of their own, the rest in one."""
+        textured = mesh.textures is not None
+        names = ["position_mm", "normal", "base_colour", "openness_0", "openness_1", "openness_2"]
+        names += ["texture_place"] * textured
+        static = self._context.buffer(_static_attributes(mesh, self._transfer.openness))
+        return self._context.vertex_array(
+            self._program,
+            [
+                (self._clip, "4f", "clip"),
+                (self._diffuse, "3f", "diffuse_radiance"),
+                (static, " ".join(["3f"] * len(names)), *names),
+            ],
+            self._context.buffer(np.ascontiguousarray(mesh.faces, np.int32)),
+        )
 
     def _set(self, name: str, value: object) -> None:
         # a driver drops uniforms whose value cannot matter

@@ -1,5 +1,6 @@
 """Reads an object from any file that trimesh loads: scenes are flattened, colours and textures kept as base colour."""
 
+import struct
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +19,11 @@ UpAxis = Literal["auto", "y", "z"]
 MAX_VERTICES = 20_000
 """More vertices than this are clustered away: lighting and drawing cost grows with them."""
 _TEXTURE_SIDE = 1024
+_LOADER_ERRORS = (
+    *(ArithmeticError, AssertionError, AttributeError, EOFError, ImportError, LookupError, MemoryError, OSError),
+    *(RuntimeError, SyntaxError, TypeError, ValueError, struct.error),
+)
+"""What trimesh's parsers raise on damaged files: they check little before they read."""
 _PLAIN_REFLECTANCE = 0.5
 """Base colour of a mesh that has none."""
 _Y_UP = {".glb", ".gltf", ".obj"}
@@ -55,8 +61,7 @@ def _parts(path: Path) -> list[trimesh.Trimesh]:
     try:
         scene = trimesh.load_scene(path, process=False)
         parts = scene.dump()
-    # the loaders raise whatever their parsers do on a damaged file
-    except Exception as error:
+    except _LOADER_ERRORS as error:
         raise MeshError(f"could not be read as a mesh ({type(error).__name__}: {error}); is it complete?") from error
     triangles = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces) > 0]
     if not triangles:

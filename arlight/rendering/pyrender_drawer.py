@@ -137,10 +137,12 @@ def _load_pyrender() -> Any:
 
 def _offscreen(pyrender: Any) -> Any:
     """An off-screen renderer whose end destroys its own context and no more."""
+    from OpenGL.error import Error as OpenGLError
+
     try:
         offscreen = pyrender.OffscreenRenderer(_TILE_PX, _TILE_PX)
-    # PyOpenGL raises its own and bare errors where no platform answers
-    except Exception as error:
+    # pyrender asserts that EGL answers, PyOpenGL looks up functions of a library that may be missing
+    except (OpenGLError, AssertionError, AttributeError, ImportError, OSError, ValueError) as error:
         raise RenderingUnavailable(
             f"pyrender found no OpenGL through EGL ({error}); install libegl1 or use --renderer moderngl"
         ) from error
