@@ -39,7 +39,7 @@ def run(options: EvaluateOptions) -> int:
     """
     log = read_log(options.log)
     evaluation = evaluate(log, load_truth(options.truth))
-    console = Console(soft_wrap=True, highlight=False)
+    console = Console(soft_wrap=True, highlight=False, markup=False)
     if options.json:
         console.out(json.dumps(_without_nan(asdict(evaluation)), indent=1), highlight=False)
         return 0

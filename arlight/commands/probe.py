@@ -55,12 +55,12 @@ def run(options: ProbeOptions) -> int:
         paper=options.paper,
     )
     written = write_probe(probe, options.output, options.paper, options.mirror_film)
-    console = Console(soft_wrap=True, highlight=False)
+    console = Console(soft_wrap=True, highlight=False, markup=False)
     patterns = sum(block.kind == "pattern" for block in probe.blocks)
     console.print(
         f"order {probe.order}, {probe.design}: {patterns} patterned blocks, {len(probe.markers)} markers, "
         f"{probe.sheet_mm[0]:.1f} x {probe.sheet_mm[1]:.1f} mm"
     )
     for path in written:
-        console.print(f"  {path}", markup=False)
+        console.print(f"  {path}")
     return 0

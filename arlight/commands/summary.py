@@ -27,4 +27,4 @@ def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interr
     table.add_row("ms per frame", f"{stages} (medians)")
     for what, path in written.items():
         table.add_row(what, str(path))
-    Console(soft_wrap=True, highlight=False).print(table)
+    Console(soft_wrap=True, highlight=False, markup=False).print(table)

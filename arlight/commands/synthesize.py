@@ -64,7 +64,7 @@ class SynthesizeOptions:
     probe: OptionalFile = None
     """probe.json of the sheet; one of --order is designed by default."""
     camera: OptionalFile = None
-    """camera.json of the camera that films; a phone-like one of --size by default."""
+    """camera.json of the camera that films; a phone-like one of the size asked for by default."""
     order: int = 5
     """Order of the sheet that is designed, 1 to 8."""
     white: float = 0.6

@@ -49,7 +49,7 @@ def run(options: TableOptions) -> int:
     # refused before the sheet is drawn, which takes seconds
     load_environment(options.environment)
     probe = design_probe(options.order)
-    console = Console(soft_wrap=True, highlight=False)
+    console = Console(soft_wrap=True, highlight=False, markup=False)
     cells = []
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("clips", total=len(options.tilts_deg) * len(options.widths_px))

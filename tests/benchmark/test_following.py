@@ -70,7 +70,7 @@ def test_a_light_that_trails_by_a_known_angle(behind_deg):
     assert lag is not None
     # the angle on the sphere between two directions of one elevation
     expected = 2.0 * np.degrees(np.arcsin(np.cos(np.radians(50.0)) * np.sin(np.radians(abs(behind_deg) / 2.0))))
-    assert lag[0] == pytest.approx(expected, rel=1e-4)
+    assert lag[0] == pytest.approx(expected, rel=2e-3)
     # the motion at the first and last frame is a one-sided difference
     assert lag[1] == pytest.approx(np.sign(behind_deg) * expected, rel=0.01)
 
@@ -79,7 +79,8 @@ def test_an_error_across_the_motion_is_no_lag():
     azimuth = np.linspace(0.0, 60.0, 61)
     lag = direction_lag(turning(azimuth, 52.0), turning(azimuth), FREQUENCIES, SLAB, np.arange(61) / 30)
     assert lag is not None
-    assert lag[0] == pytest.approx(2.0, rel=1e-4)
+    # the lobe's centroid is taken on a grid
+    assert lag[0] == pytest.approx(2.0, rel=2e-3)
     assert abs(lag[1]) < 0.01
 
 

@@ -1,0 +1,55 @@
+"""A clip with the probe and camera that belong to it."""
+
+import shutil
+
+import pytest
+
+from arlight.camera import Camera
+from arlight.commands.footage import FootageOptions, check_result, open_footage
+from arlight.errors import CameraError, ProbeError, VideoError
+from arlight.results.record import LogRecord
+from arlight.results.statistics import RunStatistics
+
+
+def seen(status: str) -> RunStatistics:
+    statistics = RunStatistics()
+    statistics.add(LogRecord(0, 0.0, status, None, 0.0, None, None, None, 1.0, {}))
+    return statistics
+
+
+def test_sidecars_are_found_by_themselves(footage):
+    with open_footage(footage / "orbit.mp4", FootageOptions()) as found:
+        assert found.probe_path == footage / "probe.json"
+        assert found.camera_path == footage / "camera.json"
+        assert found.probe.order == 1
+        assert found.camera.image_size == found.reader.size == (320, 240)
+
+
+def test_what_is_given_goes_before_what_lies_beside(footage, tmp_path):
+    given = shutil.copy(footage / "probe.json", tmp_path / "given.json")
+    with open_footage(footage / "orbit.mp4", FootageOptions(probe=given)) as found:
+        assert found.probe_path == given
+
+
+def test_missing_sidecars_and_wrong_sizes_are_refused(footage, tmp_path):
+    clip = shutil.copy(footage / "orbit.mp4", tmp_path / "clip.mp4")
+    with pytest.raises(ProbeError, match=r"clip\.mp4: no probe\.json beside it"):
+        open_footage(clip, FootageOptions())
+    with pytest.raises(CameraError, match=r"clip\.mp4: no camera\.json beside it"):
+        open_footage(clip, FootageOptions(probe=footage / "probe.json"))
+    camera = Camera.load(footage / "camera.json")
+    Camera((320, 200), camera.camera_matrix, camera.distortion).save(tmp_path / "low.json")
+    with pytest.raises(CameraError, match=r"low\.json: is for pictures of 320x200.*320x240"):
+        open_footage(clip, FootageOptions(probe=footage / "probe.json", camera=tmp_path / "low.json"))
+
+
+def test_a_run_that_saw_the_sheet_is_accepted(footage):
+    with open_footage(footage / "orbit.mp4", FootageOptions()) as found:
+        check_result(found, seen("tracked"))
+        with pytest.raises(ProbeError, match="but not where"):
+            check_result(found, seen("lost"))
+
+
+def test_a_clip_without_markers_is_told_from_one_with_others(empty_table):
+    with open_footage(empty_table, FootageOptions()) as found, pytest.raises(VideoError, match="no frame showed"):
+        check_result(found, seen("lost"))
