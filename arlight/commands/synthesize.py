@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from arlight.camera import Camera
@@ -86,7 +87,7 @@ def run(options: SynthesizeOptions) -> int:
     probe = design_probe(options.order) if options.probe is None else load_probe(options.probe)
     name = options.name or options.path
     with Interruption() as interruption, Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(name, total=settings.frame_count)
+        task = progress.add_task(escape(name), total=settings.frame_count)
 
         def watch(_frame: SyntheticFrame) -> None:
             progress.advance(task)
