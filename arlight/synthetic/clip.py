@@ -13,7 +13,7 @@ from arlight.synthetic.synthesis import SyntheticFrame, synthesize
 from arlight.synthetic.truth import ClipTruth, FrameTruth, save_truth
 from arlight.video.writer import VideoWriter
 
-CRF = 18
+CRF = 16
 PRESET = "slow"
 
 

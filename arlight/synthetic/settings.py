@@ -50,7 +50,7 @@ class SynthesisSettings:
     """Camera that films; 1280x720 with a slight lens distortion by default."""
     white: float = 0.6
     """Linear value of white paper in its brightest channel under the brightest light; sets the exposure."""
-    bounces: int = 2
+    bounces: int = 3
     """How often light between paper and glass is followed; 0 for single scattering."""
     sample_mm: float = 0.13
     """Largest distance of samples on the sheet, well below the finest stripe; 0.3 is twice as fast [mm]."""

@@ -23,7 +23,7 @@ class Stage:
         slab: Slab,
         camera: Camera,
         script: LightScript,
-        bounces: int = 2,
+        bounces: int = 3,
         sampling: Sampling | None = None,
     ) -> None:
         """

@@ -45,7 +45,7 @@ class LightTransport:
     """The sheet."""
     slab: Slab
     """The glass between film and paper."""
-    bounces: int = 2
+    bounces: int = 3
     """How often light returned to the paper by the glass is followed; 0 for single scattering."""
 
     def irradiance(self, environment: Environment) -> IrradianceMap:
