@@ -1,11 +1,12 @@
 """Robust weighted least squares of one colour channel: weights, blur and solution are refined together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.normal_equations import BlockSystem
+from arlight.estimation.prior import COLOR_SPREAD
 from arlight.estimation.response import optical_transfer
 from arlight.estimation.row_noise import row_variance
 from arlight.tracking.block_means import BlockMeans
@@ -28,12 +29,14 @@ _WEAKEST_TRANSFER = 0.12
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """What the stripes reveal beside the lighting; one frame's is the next one's first guess."""
+    """What a frame reveals beside the lighting; one frame's is the next one's first guess."""
 
     blur_variance_px2: float = 0.4
     """Variance of the picture's blur [px^2]."""
     lower_face: float = 1.0
     """Mirror reflection in the glass's lower face, relative to Fresnel's; less where paper sticks to the glass."""
+    color_spread: tuple[float, float] = (COLOR_SPREAD, COLOR_SPREAD)
+    """How far red and blue coefficients stray from green's, relative to L~_0 at order 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,4 +156,8 @@ def _next_nuisance(
     face = last.lower_face + (np.sum(precision * lower * residual) + pull) / (
         np.sum(precision * lower**2) + 1.0 / _LOWER_FACE_SPREAD**2
     )
-    return Nuisance(float(np.clip(blur, *_BLUR_RANGE_PX2)), float(np.clip(face, 0.0, 1.5)))
+    return replace(
+        last,
+        blur_variance_px2=float(np.clip(blur, *_BLUR_RANGE_PX2)),
+        lower_face=float(np.clip(face, 0.0, 1.5)),
+    )

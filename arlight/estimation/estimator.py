@@ -4,7 +4,7 @@ Unknown for each channel are the coefficients and the reflection field. Green is
 sharpest of the three, and the reflection in red and blue follows its pattern, for it is the same mirrored scene.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from arlight.estimation.channel_fit import ChannelFit, Nuisance, fit_channel
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.normal_equations import BlockSystem
-from arlight.estimation.prior import color_stddev, prior_stddev
+from arlight.estimation.prior import color_spread, color_stddev, prior_stddev
 from arlight.estimation.reflection import field_amplitude, reflection_basis
 from arlight.estimation.response import BlockResponse
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
@@ -79,6 +79,7 @@ class LightingEstimator:
         green = self._fit(means, rows, lower, _GREEN, white, nuisance or Nuisance(), None)
         red, blue = (self._fit(means, rows, lower, channel, white, green.nuisance, green) for channel in (0, 2))
         fits = (red, green, blue)
+        spreads = (self._color_spread(red, green), self._color_spread(blue, green))
         lighting = Lighting(
             self._frequencies,
             unpack_real(np.stack([fit.packed for fit in fits], axis=1)),
@@ -87,7 +88,7 @@ class LightingEstimator:
             float(np.mean([fit.chi2 for fit in fits])),
         )
         reflection = np.stack([red.field, green.reflection, blue.field], axis=1)
-        return Estimate(lighting, _colors(fits, reflection, white), reflection, green.nuisance)
+        return Estimate(lighting, _colors(fits, reflection, white), reflection, replace(green.nuisance, color_spread=spreads))
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""
@@ -117,9 +118,8 @@ class LightingEstimator:
         if green is not None:
             share = level / white[_GREEN]
             expected = green.packed * share
-            spread = np.hypot(
-                color_stddev(self._frequencies, irradiance), share * np.sqrt(np.diagonal(green.covariance))
-            )
+            colorful = color_stddev(self._frequencies, irradiance, nuisance.color_spread[channel // 2])
+            spread = np.hypot(colorful, share * np.sqrt(np.diagonal(green.covariance)))
         system = BlockSystem(
             self._column,
             self._patterned,
@@ -128,6 +128,10 @@ class LightingEstimator:
             np.concatenate([spread, deviation]),
         )
         return fit_channel(means, channel, level, rows, lower, self._mean_model, system, nuisance)
+
+    def _color_spread(self, fit: ChannelFit, green: ChannelFit) -> float:
+        difference = fit.packed - green.packed * (fit.packed[0] / max(green.packed[0], 1e-6))
+        return color_spread(self._frequencies, float(fit.packed[0]), difference, np.diagonal(fit.covariance))
 
 
 def _colors(fits: tuple[ChannelFit, ...], reflection: Array, white: Array) -> BlockColors:

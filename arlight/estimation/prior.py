@@ -7,8 +7,9 @@ from arlight.fourier import frequency_order
 
 _RELATIVE_SPREAD = 0.35
 """Standard deviation of Re and Im of L~_n relative to L~_0 at order 1, over twelve captured environments."""
-_COLOR_SPREAD = 0.08
+COLOR_SPREAD = 0.08
 """The same of the difference between red or blue and green, each relative to its own L~_0."""
+_LEAST_COLOR_SPREAD = 0.004
 _MEAN_SPREAD = 10.0
 """Standard deviation of L~_0: three times a hemisphere of full-scale radiance [radiance * sr]."""
 
@@ -23,9 +24,32 @@ def prior_stddev(frequencies: NDArray[np.int64], irradiance: float) -> NDArray[n
     return _falling(frequencies, _RELATIVE_SPREAD * max(irradiance, 1e-3))
 
 
-def color_stddev(frequencies: NDArray[np.int64], irradiance: float) -> NDArray[np.float64]:
-    """Standard deviation (2k - 1,) of red or blue about green's coefficients scaled to its irradiance."""
-    return _falling(frequencies, _COLOR_SPREAD * max(irradiance, 1e-3))
+def color_stddev(frequencies: NDArray[np.int64], irradiance: float, spread: float) -> NDArray[np.float64]:
+    """Standard deviation (2k - 1,) of red or blue about green's coefficients scaled to its irradiance.
+
+    Args:
+        frequencies: (k, 2), (0, 0) first.
+        irradiance: the channel's rough L~_0 [radiance * sr].
+        spread: relative difference at order 1, `COLOR_SPREAD` until the scene itself has shown how colourful it is.
+    """
+    return _falling(frequencies, spread * max(irradiance, 1e-3))
+
+
+def color_spread(
+    frequencies: NDArray[np.int64], irradiance: float, difference: NDArray[np.float64], variance: NDArray[np.float64]
+) -> float:
+    """How colourful a scene's light is: the spread under which an estimated difference is most likely.
+
+    One step of expectation maximisation; repeated frame by frame it converges.
+
+    Args:
+        frequencies, irradiance: as in `color_stddev`.
+        difference: (2k - 1,) estimated red or blue coefficients less green's scaled ones.
+        variance: (2k - 1,) of that estimate.
+    """
+    unit = color_stddev(frequencies, irradiance, 1.0)[1:]
+    spread = float(np.sqrt(np.mean((difference[1:] ** 2 + variance[1:]) / unit**2)))
+    return min(max(spread, _LEAST_COLOR_SPREAD), 3.0 * COLOR_SPREAD)
 
 
 def _falling(frequencies: NDArray[np.int64], first_order: float) -> NDArray[np.float64]:

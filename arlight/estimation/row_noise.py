@@ -26,6 +26,8 @@ _CODEC = 0.012
 """And in one at half the pixels' frequency, where codecs quantise coarsely; it grows with the frequency's square."""
 _COLOR_SPREAD = 0.2
 """How much the stripes' colour differs between blocks: error of a harmonic that was inferred from luma."""
+_CHROMA_MEAN = 0.001
+"""Error of a mean of red or blue that comes from subsampled, coarsely quantised chroma: an eighth of a level."""
 
 
 def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Array) -> Array:
@@ -45,6 +47,7 @@ def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Arra
     cycles = np.hypot(*means.cycles_per_px.T)[:, None] * order
     variance[:, 1:] += (white * (_SWING_MODEL + _CODEC * (2.0 * cycles) ** 2)) ** 2
     if channel != 1:
+        variance[:, 0] += np.where(means.color_trust < 1.0, (_CHROMA_MEAN * white) ** 2, 0.0)
         inferred = _COLOR_SPREAD * (1.0 - means.color_trust)
         swing = np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel])
         variance[:, 1:] += (inferred[:, None] * np.repeat(swing, 2, axis=1)) ** 2

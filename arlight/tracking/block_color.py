@@ -17,8 +17,8 @@ from arlight.tracking.block_means import BlockColors
 Array = NDArray[np.float64]
 
 _LINE_NODES = 24
-_NOISE_TO_SWING = 0.03
-"""Variance of chroma's error over that of the colour swing it should show: half a level against three."""
+_SWING_NOISE = 0.5 / 224.0
+"""Error of a chroma swing: codecs quantise it coarsely, and drop the smallest."""
 _PRIOR_VARIANCE_PX2 = 1.5
 _PRIOR_SHIFT_PX = 0.3
 
@@ -59,7 +59,9 @@ def chroma_correction(
         cycles_per_px: (b, 2) frequency of the stripes.
     """
     gain, turn = _channel_of_chroma(measured, expected, cycles_per_px)
-    seen = gain / (gain**2 + _NOISE_TO_SWING)
+    # a Wiener filter: undo the attenuation as far as the swing stands out of the codec's noise
+    power = np.mean(np.abs(measured) ** 2, axis=1) + gain**2 * np.mean(np.abs(expected) ** 2, axis=1)
+    seen = gain / (gain**2 + _SWING_NOISE**2 / np.maximum(power, 1e-12))
     missing = (measured * turn[:, None] - gain[:, None] * expected) * seen[:, None]
     patterned = np.any(cycles_per_px != 0.0, axis=1)
     missing = np.where(patterned[:, None], missing, 0.0)
