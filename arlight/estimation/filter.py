@@ -20,8 +20,10 @@ _MOVING_MEMORY_S = 0.25
 _JUDGING_S = 0.2
 """Time over which the two filters' predictions are compared [s]."""
 _MOVING_FROM, _MOVING_FULLY = 1.6, 2.4
-"""Ratio of the still filter's squared prediction error to the moving one's between which the light counts as moving.
-Still light gives 0.8 to 1.5: errors of neighbouring frames are alike, which the shorter memory predicts better."""
+"""Ratio of the still filter's squared prediction error to the moving one's between which the light counts as moving."""
+_LEAST_ERROR = 1.2
+"""Squared prediction error that the ratio starts from: errors of neighbouring frames are alike, and a short memory
+predicts them too well."""
 _SWITCH = 6.0
 """Squared prediction error over its usual level from which a frame is a switch."""
 _COMMON_ERROR = 4.0
@@ -90,7 +92,7 @@ class LightingFilter:
         return True
 
     def _heard(self, frequencies: NDArray[np.int64], time_s: float, chi2: float) -> Lighting:
-        ratio = self._errors[0] / max(self._errors[1], 1e-9)
+        ratio = self._errors[0] / max(self._errors[1], _LEAST_ERROR)
         share = float(np.clip((ratio - _MOVING_FROM) / (_MOVING_FULLY - _MOVING_FROM), 0.0, 1.0))
         values = (1.0 - share) * self._still.values + share * self._moving.values
         covariance = (1.0 - share) * self._still.covariance + share * self._moving.covariance
