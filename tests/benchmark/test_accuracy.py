@@ -37,3 +37,11 @@ def test_time_does_not_make_it_worse(cells):
         assert single is not None
         # systematic errors stay, noise is averaged
         assert filtered.relative_to_l0 <= 1.1 * single.relative_to_l0
+
+
+def test_no_single_frame_beats_its_bound_and_a_nearer_sheet_has_a_lower_one(cells):
+    for cell in cells:
+        # the median over frames and a prior may fall a little below the bound of the rms
+        assert cell.single_frame.orders[1].relative_to_l0 > 0.5 * cell.bound[1]
+    far, near = cells[0], cells[1]
+    assert all(n < f for n, f in zip(near.bound, far.bound, strict=True))
