@@ -26,7 +26,7 @@ class Camera:
     image_size: tuple[int, int]
     """(width, height) [px]."""
     camera_matrix: Array
-    """(3, 3) intrinsic matrix [px]."""
+    """(3, 3) intrinsic matrix without skew [px]."""
     distortion: Array
     """(n,) lens distortion in OpenCV's order; zeros for none."""
 
@@ -71,7 +71,7 @@ class Camera:
         pixels, _ = cv2.projectPoints(
             points, camera_from_probe.rvec, camera_from_probe.translation, self.camera_matrix, self.distortion
         )
-        return pixels.reshape(-1, 2)
+        return np.asarray(pixels, float).reshape(-1, 2)
 
     def rays(self, pixels: ArrayLike) -> Array:
         """Undistorted normalised image coordinates (n, 2) of pixels (n, 2): the ray is (x, y, 1)."""
@@ -79,11 +79,12 @@ class Camera:
         if not np.any(self.distortion):
             k = self.camera_matrix
             y = (flat[:, 0, 1] - k[1, 2]) / k[1, 1]
-            return np.stack([(flat[:, 0, 0] - k[0, 2] - k[0, 1] * y) / k[0, 0], y], axis=-1)
+            return np.stack([(flat[:, 0, 0] - k[0, 2]) / k[0, 0], y], axis=-1)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
-        return cv2.undistortPoints(
+        undistorted = cv2.undistortPoints(
             flat, self.camera_matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria
-        ).reshape(-1, 2)
+        )
+        return np.asarray(undistorted, float).reshape(-1, 2)
 
     @cached_property
     def ray_map(self) -> NDArray[np.float32]:
@@ -107,13 +108,13 @@ class Pose:
     def from_rvec(cls, rvec: ArrayLike, translation: ArrayLike) -> "Pose":
         """From a Rodrigues vector (3,) [rad] and a translation (3,) [mm]."""
         rotation, _ = cv2.Rodrigues(np.asarray(rvec, float).reshape(3, 1))
-        return cls(rotation, np.asarray(translation, float).reshape(3))
+        return cls(np.asarray(rotation, float), np.asarray(translation, float).reshape(3))
 
     @property
     def rvec(self) -> Array:
         """(3,) Rodrigues vector [rad]."""
         vector, _ = cv2.Rodrigues(np.asarray(self.rotation, float))
-        return vector.reshape(3)
+        return np.asarray(vector, float).reshape(3)
 
     @property
     def camera_centre_mm(self) -> Array:
@@ -137,5 +138,10 @@ def _check_intrinsics(image_size: tuple[int, int], matrix: Array, distortion: Ar
         raise CameraError(f"camera_matrix must be 3x3 and finite, found shape {matrix.shape}")
     if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or not np.allclose(matrix[2], [0, 0, 1]):
         raise CameraError("camera_matrix must have positive focal lengths and [0, 0, 1] as its last row")
+    if matrix[0, 1] != 0.0 or matrix[1, 0] != 0.0:
+        # OpenCV ignores skew without a word
+        raise CameraError(
+            f"camera_matrix must have no skew, found {matrix[0, 1]:g} beside the focal length; calibrate without it"
+        )
     if distortion.size not in (0, 4, 5, 8, 12, 14) or not np.all(np.isfinite(distortion)):
         raise CameraError(f"distortion must hold 4, 5, 8, 12 or 14 finite numbers, found {distortion.size}")

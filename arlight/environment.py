@@ -7,7 +7,9 @@ counted from +x toward +y.
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
+import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.errors import EnvironmentMapError
@@ -15,6 +17,8 @@ from arlight.fourier import analyse
 from arlight.optics import Slab
 
 Array = NDArray[np.float64]
+
+_EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,7 @@ class Environment:
         """Read a Radiance (.hdr) or OpenEXR (.exr) latitude-longitude map.
 
         Raises:
-            EnvironmentMapError: the file is missing, unreadable, not 2:1, or not finite and non-negative.
+            EnvironmentMapError: the file is missing, unreadable, not 2:1, or holds negative or infinite radiance.
         """
         return cls(_read_radiance(Path(path)))
 
@@ -116,29 +120,44 @@ def blend(first: Environment, second: Environment, share: float) -> Environment:
 def _read_radiance(path: Path) -> NDArray[np.float32]:
     if not path.is_file():
         raise EnvironmentMapError(f"{path}: no such environment; expected a latitude-longitude .hdr or .exr file")
-    image = _decode(path)
-    if image is None or image.ndim != 3 or image.shape[2] < 3:
-        raise EnvironmentMapError(f"{path}: not a readable .hdr or .exr colour image")
-    rows, columns = image.shape[:2]
+    try:
+        with path.open("rb") as file:
+            is_exr = file.read(len(_EXR_MAGIC)) == _EXR_MAGIC
+    except OSError as error:
+        raise EnvironmentMapError(f"{path}: cannot be read ({error.strerror})") from error
+    radiance = _decode_exr(path) if is_exr else _decode_hdr(path)
+    rows, columns = radiance.shape[:2]
     if columns != 2 * rows or rows % 2 or rows < 4:
         raise EnvironmentMapError(
             f"{path}: expected a latitude-longitude map twice as wide as high with an even number of rows, "
             f"found {columns} x {rows}; resize it to 2:1"
         )
-    radiance = np.ascontiguousarray(image[..., 2::-1], dtype=np.float32)
     if not np.all(np.isfinite(radiance)) or radiance.min() < 0.0:
         raise EnvironmentMapError(f"{path}: radiance must be finite and not negative; clean the map first")
     return radiance
 
 
-def _decode(path: Path) -> NDArray[np.float32] | None:
-    # imported here: OpenCV reads this switch for OpenEXR when it is first loaded
-    import os
-
-    os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")
-    import cv2
-
+def _decode_hdr(path: Path) -> NDArray[np.float32]:
     try:
-        return cv2.imread(str(path), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+        image = cv2.imread(str(path), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     except cv2.error as error:
-        raise EnvironmentMapError(f"{path}: could not be decoded as .hdr or .exr") from error
+        raise EnvironmentMapError(f"{path}: not a readable .hdr or .exr image; export the map again") from error
+    if image is None or image.ndim != 3 or image.dtype != np.float32:
+        # eight-bit pictures end at white: their lamps are missing
+        raise EnvironmentMapError(f"{path}: not a readable .hdr or .exr colour image; export the map again")
+    return np.ascontiguousarray(image[..., 2::-1])
+
+
+def _decode_exr(path: Path) -> NDArray[np.float32]:
+    # not by OpenCV: its packages are built without OpenEXR
+    try:
+        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    except (RuntimeError, ValueError) as error:
+        raise EnvironmentMapError(f"{path}: the OpenEXR image cannot be read; export the map again") from error
+    missing = {"R", "G", "B"} - channels.keys()
+    if missing:
+        raise EnvironmentMapError(
+            f"{path}: expected the channels R, G and B, found {', '.join(sorted(channels)) or 'none'}; "
+            "export the map as plain RGB"
+        )
+    return np.stack([np.asarray(channels[name].pixels, np.float32) for name in "RGB"], axis=-1)
