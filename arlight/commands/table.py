@@ -14,6 +14,10 @@ from arlight.synthetic.captured import load_environment
 from arlight.synthetic.settings import SynthesisSettings
 
 
+_FIXED_WIDTH = 45
+_CELL_WIDTH = 26
+
+
 @dataclass(frozen=True)
 class TableOptions:
     """Measure the error per order at several camera tilts and sheet widths, on synthesised footage.
@@ -56,7 +60,8 @@ def run(options: TableOptions) -> int:
         for cell in accuracy_table(settings, probe):
             cells.append(cell)
             progress.advance(task)
-    console.print(_table(cells, options))
+    # a row is one line, also where the output is a file
+    console.print(_table(cells, options), width=max(console.width, _FIXED_WIDTH + _CELL_WIDTH * (options.order + 1)))
     return 0
 
 

@@ -7,6 +7,8 @@ def test_a_row_for_every_clip(arlight):
     rows = [line.replace("│", " ").split() for line in done.output.splitlines()]
     numbers = [row for row in rows if row[:1] == ["20"]]
     assert [row[1] for row in numbers] == ["200", "300"]
+    # filtered, single frame and bound of both orders, in one line
+    assert all(row.count("/") == 4 for row in numbers)
 
 
 def test_an_unknown_environment_is_refused(arlight):
