@@ -17,7 +17,7 @@ def create_context() -> moderngl.Context:
         RenderingUnavailable: there is no EGL driver; says which packages to install.
     """
     try:
-        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[call-arg]
+        return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
     # moderngl and glcontext raise bare Exception when the library or a driver is missing
     except Exception as error:
         raise RenderingUnavailable(
