@@ -112,10 +112,11 @@ class LightingTracker:
         if pose.camera_from_probe is None:
             return None, perf_counter()
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
-        for _ in range(1 if self._last else _FIRST_PASSES):
-            last = self._last
+        last, measured = self._last, 0.0
+        for _ in range(1 if last else _FIRST_PASSES):
             colors, nuisance = (last.colors, last.nuisance) if last else (None, Nuisance(blur_px**2))
             means = self._meter.measure(frame, pose.camera_from_probe, blur_px, colors)
             measured = perf_counter()
-            self._last = self._estimator.estimate(means, frame.time_s, nuisance)
-        return self._last.lighting, measured
+            last = self._estimator.estimate(means, frame.time_s, nuisance)
+        self._last = last
+        return last.lighting if last else None, measured

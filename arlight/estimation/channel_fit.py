@@ -18,6 +18,10 @@ _FREEDOM = 4.0
 """Degrees of freedom of the Student-t distribution of the rows' errors."""
 _SPARKLE = 0.0008
 """Usual standard deviation of what a block mirrors beside the smooth field, relative to white."""
+_EXTRA_TO_SHADING = 0.5
+"""What a block mirrors beside the smooth field, relative to how uneven the block is: a lamp's halo has a slope."""
+_EVEN = 0.005
+"""Slope that noise and codec give an even block, relative to white."""
 _FIRST_SPARKLE = 0.02
 """The same in the first iteration, wide enough that no lamp pulls the solution before it is recognised."""
 _BLUR_RANGE_PX2 = (0.0, 6.0)
@@ -84,7 +88,9 @@ def fit_channel(
     values = means.values[:, :, channel]
     variance = row_variance(means, channel, white, mean_model)
     weights = np.ones_like(values)
-    lamp = np.full(len(values), (_FIRST_SPARKLE * white) ** 2)
+    uneven = np.maximum(means.shading[:, channel] - _EVEN * white, 0.0)
+    ordinary = (_SPARKLE * white) ** 2 + (_EXTRA_TO_SHADING * uneven) ** 2
+    lamp = np.maximum(ordinary, (_FIRST_SPARKLE * white) ** 2)
     for _ in range(_ITERATIONS):
         transfer = optical_transfer(means.cycles_per_px, nuisance.blur_variance_px2)
         design = rows * transfer[..., None]
@@ -95,7 +101,7 @@ def fit_channel(
         solution, normal = system.solve(design, mirror, values, _without_lamps(precision, mirror, lamp))
         lit, field = system.lit(solution, design), system.field(solution)
         residual = values - lit - mirror * field[:, None]
-        extra, lamp = _next_lamps(residual, precision, mirror, lamp, white)
+        extra, lamp = _next_lamps(residual, precision, mirror, lamp, ordinary)
         residual = residual - mirror * extra[:, None]
         squared = residual**2 / variance
         # a stray mean is a lamp's, which has an unknown of its own; weights judge the harmonics
@@ -105,7 +111,7 @@ def fit_channel(
     size = len(solution) - system.field_size
     return ChannelFit(
         packed=solution[:size],
-        covariance=np.linalg.inv(normal)[:size, :size],
+        covariance=np.asarray(np.linalg.inv(normal)[:size, :size], float),
         field=field,
         reflection=reflection,
         lit=lit,
@@ -127,12 +133,11 @@ def _without_lamps(precision: Array, mirror: Array, lamp: Array) -> Array:
     return matrices
 
 
-def _next_lamps(residual: Array, precision: Array, mirror: Array, lamp: Array, white: float) -> tuple[Array, Array]:
+def _next_lamps(residual: Array, precision: Array, mirror: Array, lamp: Array, ordinary: Array) -> tuple[Array, Array]:
     """What each block mirrors beside the smooth field, and the variance to grant it (a Student-t, block by block)."""
     seen = np.sum(precision * mirror**2, axis=1)
     spread = lamp / (1.0 + lamp * seen)
     extra = spread * np.sum(precision * mirror * residual, axis=1)
-    ordinary = (_SPARKLE * white) ** 2
     return extra, (_FREEDOM * ordinary + extra**2 + spread) / (_FREEDOM + 1.0)
 
 

@@ -88,7 +88,8 @@ class LightingEstimator:
             float(np.mean([fit.chi2 for fit in fits])),
         )
         reflection = np.stack([red.field, green.reflection, blue.field], axis=1)
-        return Estimate(lighting, _colors(fits, reflection, white), reflection, replace(green.nuisance, color_spread=spreads))
+        learnt = replace(green.nuisance, color_spread=spreads)
+        return Estimate(lighting, _colors(fits, reflection, white), reflection, learnt)
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""

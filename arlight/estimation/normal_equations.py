@@ -54,7 +54,8 @@ class BlockSystem:
         right[c:] = products[:, 3, 4] @ basis
         normal[np.diag_indices_from(normal)] += self._prior
         right += self._prior * self._expected
-        return np.linalg.solve(normal, right), normal
+        solution: Array = np.linalg.solve(normal, right)
+        return solution, normal
 
     def field(self, solution: Array) -> Array:
         """Reflection field (blocks,) of a solution."""

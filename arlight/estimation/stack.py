@@ -94,9 +94,11 @@ def _radiosity(film: ComplexArray, paper: ComplexArray, block: Block, slab: Slab
     entering[centre - 1, 1:] = film[centre - 1] * np.array([1.0, 1j])
     reflect = _convolution(paper)
     if not bounces:
-        return reflect @ entering
+        single: ComplexArray = reflect @ entering
+        return single
     returned = _returned_light(film, float(np.hypot(*(block.frequency or (0, 0)))), slab)
-    return np.linalg.solve(np.eye(len(film)) - reflect @ returned, reflect @ entering)
+    settled: ComplexArray = np.linalg.solve(np.eye(len(film)) - reflect @ returned, reflect @ entering)
+    return settled
 
 
 def _returned_light(film: ComplexArray, frequency: float, slab: Slab) -> ComplexArray:
@@ -112,7 +114,8 @@ def _returned_light(film: ComplexArray, frequency: float, slab: Slab) -> Complex
     within = np.abs(a) <= HARMONICS
     film_part = np.where(within, squared[np.clip(a + HARMONICS, 0, 2 * HARMONICS)], 0.0)
     upper = film_part * upper_face_return(slab, frequency * np.abs(2 * k + a))
-    return upper + lower_face_return(slab) * np.eye(len(harmonics))
+    returned: ComplexArray = upper + lower_face_return(slab) * np.eye(len(harmonics), dtype=complex)
+    return returned
 
 
 def lower_face_return(slab: Slab) -> float:

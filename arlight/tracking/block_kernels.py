@@ -66,7 +66,9 @@ def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, pl
 
 
 @njit(cache=True)
-def fit(values, used, first, positions, phases, harmonics, degree, coefficients, covariance, variance, samples):
+def fit(
+    values, used, first, positions, phases, harmonics, degree, coefficients, covariance, variance, shading, samples
+):
     """Least squares of each block's pixels on its harmonics and a polynomial of x and y.
 
     Args:
@@ -75,7 +77,7 @@ def fit(values, used, first, positions, phases, harmonics, degree, coefficients,
         degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
 
     Fills coefficients (b, 7, r) and their covariance (b, 7, 7) for unit variance, variance (b, r) of a pixel about the
-    fit, samples (b,); blocks with too few pixels get 0 samples. The polynomial's constant is the mean over the middle
+    fit, shading (b, r), the slope from the block's middle to its border, samples (b,); blocks with too few pixels get 0 samples. The polynomial's constant is the mean over the middle
     of the block's symmetric window, which is what the block's mean is without stripes.
     """
     rights = values.shape[1]
@@ -123,6 +125,7 @@ def fit(values, used, first, positions, phases, harmonics, degree, coefficients,
                 explained += solved[a] * right[a, c]
             coefficients[block, :kept, c] = solved[:kept]
             variance[block, c] = max(squares[c] - explained, 0.0) / (count - columns)
+            shading[block, c] = np.hypot(solved[kept], solved[kept + 1])
 
 
 @njit(cache=True)
@@ -251,15 +254,23 @@ def correct_chroma(ycc, first, phases, expected, shift, swing, dark_luma):
 
 
 @njit(cache=True)
-def linearise(encoded, count, matrix, table, clip, linear, used):
-    """Linear RGB (n, 3) of encoded triples by matrix and transfer table; marks pixels with a clipped channel."""
+def linearise(encoded, count, matrix, table, linear):
+    """Linear RGB (n, 3) of encoded triples by matrix and transfer table."""
     last = table.shape[0] - 1
     for i in range(count):
-        used[i] = True
         for c in range(3):
             e = matrix[c, 0] * encoded[i, 0] + matrix[c, 1] * encoded[i, 1] + matrix[c, 2] * encoded[i, 2]
-            if e >= clip:
-                used[i] = False
             x = min(max(e, 0.0), 1.0) * last
             k = min(int(x), last - 1)
             linear[i, c] = table[k] + (x - k) * (table[k + 1] - table[k])
+
+
+@njit(cache=True)
+def below(linear, first, ceiling, used):
+    """Mark the pixels all of whose channels are below their block's ceiling (b, 3)."""
+    for block in range(first.shape[0] - 1):
+        for i in range(first[block], first[block + 1]):
+            used[i] = True
+            for c in range(3):
+                if linear[i, c] > ceiling[block, c]:
+                    used[i] = False

@@ -21,6 +21,8 @@ class BlockMeans:
     """(blocks, 7, 7): covariance of the values for pixels of unit variance."""
     pixel_variance: NDArray[np.float64]
     """(blocks, 3): variance of one pixel about the fitted stripes [full scale squared]."""
+    shading: NDArray[np.float64]
+    """(blocks, 3): how uneven a block is beside its stripes, from its middle to its border [full scale]."""
     harmonics: NDArray[np.int64]
     """(blocks,) how many harmonics were separated, 0 to 3; the values beyond are 0 and mean nothing."""
     samples: NDArray[np.int64]

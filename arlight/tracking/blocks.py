@@ -20,9 +20,11 @@ from arlight.video.frame import Frame
 
 Array = NDArray[np.float64]
 
-_CLIP = 0.975
-"""Encoded value from which a pixel counts as clipped: codecs ring around true white."""
-_UNCLIPPED_SHARE = 0.7
+_CLIP = 0.94
+"""Linear value from which a pixel counts as clipped: codecs ring around true white."""
+_BRIGHTEST_STRIPE = 1.1
+"""Radiance that no stripe reaches, relative to white: what is brighter is a lamp in the film."""
+_UNCLIPPED_SHARE = 0.35
 _MIN_SAMPLES = 24
 _LAMP_DEVIATION = 0.02
 """Deviation of a block's pixels from its stripes, relative to the brightest block, that means a lamp in the film."""
@@ -80,7 +82,8 @@ class BlockMeter:
             trust = self._infer_chroma(frame, view, count, colors)
         table = decoding_table(frame.format.transfer)[:-1]
         matrix = frame.format.rgb_from_ycc().astype(float)
-        kernels.linearise(self._encoded, count, matrix, table, _CLIP, self._linear, self._used)
+        kernels.linearise(self._encoded, count, matrix, table, self._linear)
+        kernels.below(self._linear, self._first, self._ceiling(count), self._used)
         return self._fit(view, trust)
 
     def _gather(self, view: BlockView, pose: Pose) -> int:
@@ -138,13 +141,25 @@ class BlockMeter:
         )
         return correction.trust
 
+    def _ceiling(self, count: int) -> Array:
+        """(blocks, 3) linear values that only a mirrored lamp exceeds."""
+        average = np.empty((len(self._patterned), 3))
+        kernels.block_average(self._linear[:count], self._first, average)
+        ceiling = np.full_like(average, _CLIP)
+        white = average[self._white & (np.diff(self._first) >= _MIN_SAMPLES)]
+        if len(white):
+            # a lower quartile: some of the white blocks may mirror a lamp themselves
+            level = _BRIGHTEST_STRIPE * np.quantile(white, 0.25, axis=0)
+            ceiling[~self._white] = np.minimum(level, _CLIP)
+        return ceiling
+
     def _reference_colors(self, average: Array, frame: Frame) -> BlockColors:
         """One dark and one white colour for the whole sheet, from the reference regions."""
         table = decoding_table(frame.format.transfer)[:-1]
         encoded = np.clip(average @ frame.format.rgb_from_ycc().astype(float).T, 0.0, 1.0)
         linear = np.interp(encoded, np.linspace(0.0, 1.0, len(table)), table)
         seen = np.diff(self._first) >= _MIN_SAMPLES
-        black, white = linear[self._black & seen], linear[self._white & seen & (encoded.max(axis=1) < _CLIP)]
+        black, white = linear[self._black & seen], linear[self._white & seen & (linear.max(axis=1) < _CLIP)]
         dark = np.median(black, axis=0) if len(black) else np.zeros(3)
         bright = np.median(white, axis=0) if len(white) else linear[seen].max(axis=0, initial=1e-3)
         ones = np.ones((len(average), 1))
@@ -159,13 +174,15 @@ class BlockMeter:
     def _refine(self, fit: "_Fit", values: Array, harmonics: NDArray[np.int64], degree: NDArray[np.int64]) -> None:
         kernels.fit(
             values, self._used, self._first, self._positions, self._phases, harmonics, degree, fit.coefficients,
-            fit.covariance, fit.variance, fit.samples,
+            fit.covariance, fit.variance, fit.shading, fit.samples,
         )  # fmt: skip
 
     def _fit(self, view: BlockView, trust: Array) -> BlockMeans:
         fit = self._solve(self._linear, view.harmonics)
         brightest = float(fit.coefficients[:, 0].max(initial=1e-6))
         lamps = np.sqrt(fit.variance.max(axis=1)) > _LAMP_DEVIATION * brightest
+        # what a straight slope leaves is as uneven as the slope itself
+        uneven = fit.shading + np.where(lamps[:, None], np.sqrt(fit.variance), 0.0)
         self._refine(fit, self._linear, view.harmonics, np.where(lamps, 3, 0))
         gathered = np.diff(self._first)
         valid = (fit.samples >= _MIN_SAMPLES) & (fit.samples >= _UNCLIPPED_SHARE * gathered)
@@ -174,6 +191,7 @@ class BlockMeter:
             values=fit.coefficients,
             covariance=fit.covariance,
             pixel_variance=fit.variance,
+            shading=uneven,
             harmonics=np.where(fit.samples > 0, view.harmonics, 0),
             samples=fit.samples,
             valid=valid,
@@ -191,6 +209,7 @@ class _Fit:
     coefficients: Array
     covariance: Array
     variance: Array
+    shading: Array
     samples: NDArray[np.int64]
 
     @classmethod
@@ -198,6 +217,7 @@ class _Fit:
         return cls(
             np.zeros((blocks, ROWS, channels)),
             np.zeros((blocks, ROWS, ROWS)),
+            np.zeros((blocks, channels)),
             np.zeros((blocks, channels)),
             np.zeros(blocks, np.int64),
         )

@@ -17,11 +17,12 @@ def luma_codes(frame: Frame) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """
     format_ = frame.format
     if format_.matrix != "rgb" and format_.bit_depth == 8:
-        return frame.planes[0], _table(format_)
+        return np.asarray(frame.planes[0], np.uint8), _table(format_)
     return frame.luma(), _table(PixelFormat("gray", True, 8, transfer=format_.transfer))
 
 
 @cache
 def _table(format_: PixelFormat) -> NDArray[np.float32]:
     black, white = format_.luma_code_range
-    return linear_from_encoded((np.arange(256) - black) / white, format_.transfer)
+    table: NDArray[np.float32] = linear_from_encoded((np.arange(256) - black) / white, format_.transfer)
+    return table
