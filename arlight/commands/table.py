@@ -13,7 +13,6 @@ from arlight.probe.layout import design_probe
 from arlight.synthetic.captured import load_environment
 from arlight.synthetic.settings import SynthesisSettings
 
-
 _FIXED_WIDTH = 45
 _CELL_WIDTH = 26
 
