@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 HARMONICS = 4
-"""Highest harmonic of psi that is followed; light bounced once more has less than 1e-3 beyond it."""
+"""Highest harmonic of psi that is followed; what is beyond it changes the ones below by less than 1e-4."""
 
 _QUADRATURE_NODES = 96
 
