@@ -1,0 +1,59 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from arlight.estimation.lighting import Lighting
+from arlight.fourier import half_plane_frequencies, pack_real, unpack_real
+
+
+def lighting_of(order, covariance=None):
+    frequencies = half_plane_frequencies(order)
+    k = len(frequencies)
+    if covariance is None:
+        covariance = np.zeros((3, 2 * k - 1, 2 * k - 1))
+    return Lighting(frequencies, np.ones((k, 3), complex), covariance, 0.5, 1.0)
+
+
+def random_covariance(size, seed):
+    roots = np.random.default_rng(seed).normal(size=(3, size, size))
+    return roots @ roots.transpose(0, 2, 1)
+
+
+@pytest.mark.parametrize("order", [0, 1, 3, 5, 8])
+def test_order_is_that_of_its_frequencies(order):
+    assert lighting_of(order).order == order
+
+
+def test_error_bars_are_the_scatter_of_estimates():
+    """Draws of correlated real unknowns: rms error of each complex coefficient."""
+    covariance = random_covariance(13, 0)
+    generator = np.random.default_rng(1)
+    errors = [unpack_real(generator.multivariate_normal(np.zeros(13), c, 40_000).T) for c in covariance]
+    scatter = np.sqrt(np.mean(np.abs(errors) ** 2, axis=2)).T
+    # relative scatter of a standard deviation from 40 000 draws: 0.0035
+    np.testing.assert_allclose(lighting_of(2, covariance).stddev, scatter, rtol=0.018)
+
+
+def test_error_bars_follow_the_order_of_packing():
+    lighting = lighting_of(3)
+    place = 5
+    coefficients = np.zeros((len(lighting.frequencies), 3), complex)
+    coefficients[place] = 3 + 4j
+    packed = pack_real(coefficients)
+    covariance = np.stack([np.outer(packed[:, c], packed[:, c]) for c in range(3)])
+    stddev = dataclasses.replace(lighting, covariance=covariance).stddev
+    assert stddev[place].tolist() == [5, 5, 5]
+    assert np.delete(stddev, place, axis=0).max() == 0
+
+
+def test_variances_that_rounding_made_negative_are_zero():
+    covariance = np.zeros((3, 5, 5))
+    covariance[0, 0, 0] = -1e-18
+    covariance[1, 1, 1] = -1e-18
+    np.testing.assert_array_equal(lighting_of(1, covariance).stddev, 0)
+
+
+def test_order_0_alone_has_an_error_bar():
+    covariance = np.array([1.0, 4.0, 9.0]).reshape(3, 1, 1)
+    np.testing.assert_allclose(lighting_of(0, covariance).stddev, [[1, 2, 3]])
