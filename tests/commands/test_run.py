@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 import trimesh
@@ -112,6 +113,40 @@ def test_a_clip_of_one_frame(arlight, footage, tmp_path):
     assert done.status == 0, done.errors
     assert len(read_log(tmp_path / "log.jsonl").records) == 1
     assert len(frames_of(tmp_path / "relit.mp4")) == 1
+
+
+@pytest.mark.parametrize("pixels", ["gray", "yuv420p10le", "yuv422p", "bgr0"])
+def test_grey_deep_and_rgb_video(arlight, footage, tmp_path, pixels):
+    clip = copy_with_sidecars(footage, tmp_path / "other", "other.mkv")
+    with av.open(str(footage / "orbit.mp4")) as source, av.open(str(clip), "w") as target:
+        stream = target.add_stream("ffv1", rate=25, width=320, height=240, pix_fmt=pixels)
+        for picture in source.decode(video=0):
+            target.mux(stream.encode(picture.reformat(format=pixels)))
+        target.mux(stream.encode(None))
+    done = arlight("run", clip, "--lighting", "log.jsonl", "--output", "relit.mkv", *QUICK)
+    assert done.status == 0, done.errors
+    log = read_log(tmp_path / "log.jsonl")
+    assert [record.status for record in log.records] == ["tracked"] * FRAMES
+    assert len(frames_of(tmp_path / "relit.mkv")) == FRAMES
+    if pixels == "gray":
+        light = log.records[-1].coefficients
+        assert light is not None
+        # a grey picture has grey light
+        np.testing.assert_allclose(light[0, 0], light[0, 2], rtol=0.02)
+
+
+def test_odd_sizes(arlight, footage, tmp_path):
+    clip = copy_with_sidecars(footage, tmp_path / "odd", "odd.mkv")
+    with VideoReader(footage / "orbit.mp4") as reader, VideoWriter(clip, frame_rate=25) as writer:
+        for frame in reader:
+            image = np.rint(255.0 * frame.encoded_rgb()).astype(np.uint8)
+            writer.write(Frame.from_rgb(np.ascontiguousarray(image[:-1, :-1]), frame.index, frame.time_s))
+    width, height = frames_of(clip)[0].size
+    camera = Camera.load(clip.parent / "camera.json")
+    Camera((width, height), camera.camera_matrix, camera.distortion).save(clip.parent / "camera.json")
+    done = arlight("run", clip, "--output", "relit.mp4", *QUICK)
+    assert done.status == 0, done.errors
+    assert "100.0 % tracked" in done.output
 
 
 REFUSED = {
