@@ -1,0 +1,218 @@
+"""Still, moving, switched and hidden light, seen through noise that is what its covariance says."""
+
+import numpy as np
+import pytest
+
+from arlight.estimation.filter import LightingFilter
+from arlight.estimation.lighting import Lighting
+from arlight.fourier import half_plane_frequencies, pack_real, unpack_real
+
+FREQUENCIES = half_plane_frequencies(3)
+SIZE = 2 * len(FREQUENCIES) - 1
+FRAME_S = 0.04
+
+
+def natural(seed=0, irradiance=1.5):
+    """(size, 3) packed coefficients like those of real light."""
+    generator = np.random.default_rng(seed)
+    order = np.repeat(np.hypot(*FREQUENCIES[1:].T), 2)[:, None]
+    swing = generator.normal(size=(SIZE - 1, 1)) + 0.1 * generator.normal(size=(SIZE - 1, 3))
+    return irradiance * np.concatenate([np.ones((1, 3)), 0.2 * swing / np.sqrt(order)])
+
+
+def correlated(sigma, seed=1):
+    """(3, size, size) covariance of noise of about sigma, the same in every frame."""
+    factors = np.random.default_rng(seed).normal(size=(3, SIZE, 3 * SIZE))
+    return sigma**2 * factors @ factors.swapaxes(1, 2) / (3 * SIZE)
+
+
+class Source:
+    """Measurements of given light with noise."""
+
+    def __init__(self, sigma=0.02, seed=2):
+        self.covariance = correlated(sigma)
+        self._factor = np.linalg.cholesky(self.covariance)
+        self._generator = np.random.default_rng(seed)
+
+    def measure(self, truth, time_s, chi2=1.0):
+        noise = np.einsum("cij,cj->ic", self._factor, self._generator.normal(size=(3, SIZE)))
+        return Lighting(FREQUENCIES, unpack_real(truth + noise), self.covariance, time_s, chi2)
+
+
+def error(lighting, truth):
+    return float(np.sqrt(np.mean((pack_real(lighting.coefficients) - truth) ** 2)))
+
+
+def assert_is_covariance(lighting):
+    assert np.all(np.isfinite(lighting.covariance))
+    np.testing.assert_allclose(lighting.covariance, lighting.covariance.swapaxes(1, 2), rtol=1e-9, atol=1e-15)
+    assert np.linalg.eigvalsh(lighting.covariance).min() > 0.0
+
+
+def test_there_is_nothing_before_the_first_estimate():
+    filter_ = LightingFilter()
+    assert filter_.update(None, 0.0) is None
+    assert filter_.update(None, 0.1) is None
+    first = Source().measure(natural(), 0.2)
+    taken = filter_.update(first, 0.2)
+    np.testing.assert_array_equal(taken.coefficients, first.coefficients)
+    np.testing.assert_array_equal(taken.covariance, first.covariance)
+    assert taken.time_s == 0.2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_still_light_averages_as_one_over_the_root_of_frames(seed):
+    filter_, source, truth = LightingFilter(), Source(seed=seed), natural(seed)
+    errors = []
+    for frame in range(120):
+        lighting = filter_.update(source.measure(truth, frame * FRAME_S), frame * FRAME_S)
+        assert_is_covariance(lighting)
+        errors.append(error(lighting, truth))
+        # honest: errors are no larger than stated
+        variance = np.einsum("cii->ic", lighting.covariance)
+        assert np.mean((pack_real(lighting.coefficients) - truth) ** 2 / variance) < 1.6
+    # sixteen frames, then the whole of a memory of at least a second
+    assert errors[15] < 0.4 * errors[0]
+    assert np.mean(errors[60:]) < 0.25 * errors[0]
+    assert np.all(np.isfinite(errors))
+
+
+def ramp(time_s, rate=0.3):
+    """Light that moves steadily: from one natural light toward another."""
+    return natural(3) + rate * time_s * (natural(4) - natural(3))
+
+
+def test_a_steady_change_is_followed_without_lag():
+    filter_, source = LightingFilter(), Source(sigma=0.004)
+    speed = np.sqrt(np.mean((ramp(1.0) - ramp(0.0)) ** 2))
+    for frame in range(75):
+        time_s = frame * FRAME_S
+        lighting = filter_.update(source.measure(ramp(time_s), time_s), time_s)
+        assert_is_covariance(lighting)
+        if time_s > 1.0:
+            change = ramp(1.0) - ramp(0.0)
+            behind = np.sum((ramp(time_s) - pack_real(lighting.coefficients)) * change) / np.sum(change**2)
+            assert abs(behind) < 1.5 * FRAME_S
+            assert error(lighting, ramp(time_s)) < 2.0 * FRAME_S * speed + 0.004
+
+
+@pytest.mark.parametrize("frames_before", [1, 2, 10, 100])
+def test_a_switched_light_is_shown_within_three_frames(frames_before):
+    filter_, source = LightingFilter(), Source(sigma=0.01)
+    before, after = natural(5, irradiance=1.0), natural(6, irradiance=1.6)
+    for frame in range(frames_before):
+        lighting = filter_.update(source.measure(before, frame * FRAME_S), frame * FRAME_S)
+    assert error(lighting, before) < 0.02
+    for frame in range(frames_before, frames_before + 3):
+        lighting = filter_.update(source.measure(after, frame * FRAME_S), frame * FRAME_S)
+    assert error(lighting, after) < 0.1 * np.sqrt(np.mean((after - before) ** 2))
+    # and it settles there
+    for frame in range(frames_before + 3, frames_before + 40):
+        lighting = filter_.update(source.measure(after, frame * FRAME_S), frame * FRAME_S)
+    assert error(lighting, after) < 0.5 * 0.01
+
+
+def test_hidden_light_stays_and_grows_uncertain_up_to_natural_light():
+    filter_, source, truth = LightingFilter(), Source(), natural(7)
+    for frame in range(30):
+        held = filter_.update(source.measure(truth, frame * FRAME_S), frame * FRAME_S)
+    variance = np.einsum("cii->ci", held.covariance)
+    for frame in range(30, 2000):
+        lighting = filter_.update(None, frame * FRAME_S)
+        grown = np.einsum("cii->ci", lighting.covariance)
+        np.testing.assert_allclose(lighting.coefficients, held.coefficients, rtol=1e-9)
+        assert np.all(grown >= variance * (1 - 1e-9))
+        assert lighting.time_s == frame * FRAME_S
+        assert np.isnan(lighting.chi2)
+        variance = grown
+    assert_is_covariance(lighting)
+    # nothing is known after a minute, but light is not boundless
+    spread = np.sqrt(variance)
+    irradiance = truth[0]
+    assert np.all(spread[:, 1:3] > 0.2 * irradiance[:, None])
+    assert np.all(spread < 10.0 * irradiance[:, None])
+    # the sheet returns: its light is taken over at once
+    returned = natural(8)
+    lighting = filter_.update(source.measure(returned, 81.0), 81.0)
+    assert error(lighting, returned) < 0.04
+
+
+def test_a_trend_is_not_carried_on_while_the_sheet_is_hidden():
+    filter_, source = LightingFilter(), Source(sigma=0.004)
+    for frame in range(50):
+        lighting = filter_.update(source.measure(ramp(frame * FRAME_S), frame * FRAME_S), frame * FRAME_S)
+    last = lighting.coefficients
+    for frame in range(50, 100):
+        lighting = filter_.update(None, frame * FRAME_S)
+    step = np.abs(unpack_real(ramp(FRAME_S) - ramp(0.0)))
+    assert np.all(np.abs(lighting.coefficients - last) <= 2.0 * step + 0.004)
+
+
+@pytest.mark.parametrize("light", [lambda _: natural(3), ramp], ids=["still", "moving"])
+def test_half_the_frames_give_about_the_same(light):
+    full, half, source = LightingFilter(), LightingFilter(), Source(sigma=0.01)
+    for frame in range(120):
+        time_s = frame * FRAME_S / 2
+        measured = source.measure(light(time_s), time_s)
+        at_full = full.update(measured, time_s)
+        if frame % 2 == 0:
+            at_half = half.update(measured, time_s)
+            if time_s > 1.0:
+                assert error(at_half, pack_real(at_full.coefficients)) < 0.01
+                assert error(at_half, light(time_s)) < 0.01
+
+
+def test_irregular_times_are_taken_as_they_are():
+    filter_, source = LightingFilter(), Source(sigma=0.004)
+    times = np.cumsum(np.random.default_rng(9).choice([0.005, 0.02, 0.04, 0.15], 80))
+    for time_s in times:
+        lighting = filter_.update(source.measure(ramp(time_s), time_s), time_s)
+        assert_is_covariance(lighting)
+    # at a constant rate per frame instead of per second the trend would be off by most of it
+    assert error(lighting, ramp(times[-1])) < 0.01
+
+
+def test_times_that_stand_still_or_run_backwards_do_no_harm():
+    filter_, source, truth = LightingFilter(), Source(), natural(10)
+    for time_s in [0.0, 0.0, 0.04, 0.04, 0.04, 0.02, -5.0, -5.0, 0.1, 0.14, 0.14]:
+        lighting = filter_.update(source.measure(truth, time_s), time_s)
+        assert_is_covariance(lighting)
+    assert error(lighting, truth) < 0.02
+    assert filter_.update(None, -100.0) is not None
+
+
+def test_repeated_times_average_like_any_other_frames():
+    filter_, source, truth = LightingFilter(), Source(), natural(11)
+    first = error(filter_.update(source.measure(truth, 0.0), 0.0), truth)
+    for _ in range(24):
+        lighting = filter_.update(source.measure(truth, 0.0), 0.0)
+    assert error(lighting, truth) < 0.35 * first
+
+
+def test_a_brighter_scene_is_filtered_alike():
+    dim, bright, gain = LightingFilter(), LightingFilter(), 20.0
+    source = Source(sigma=0.02)
+    for frame in range(60):
+        time_s = frame * FRAME_S
+        truth = natural(12) if frame < 20 else ramp(time_s)
+        measured = None if 40 <= frame < 45 else source.measure(truth, time_s)
+        scaled = measured and Lighting(
+            FREQUENCIES, gain * measured.coefficients, gain**2 * measured.covariance, time_s, measured.chi2
+        )
+        one, other = dim.update(measured, time_s), bright.update(scaled, time_s)
+        np.testing.assert_allclose(other.coefficients, gain * one.coefficients, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(other.covariance, gain**2 * one.covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_reset_is_as_good_as_new():
+    used, new = LightingFilter(), LightingFilter()
+    source = Source()
+    for frame in range(30):
+        used.update(source.measure(ramp(3.0 * frame * FRAME_S), frame * FRAME_S), frame * FRAME_S)
+    used.reset()
+    assert used.update(None, 5.0) is None
+    for frame in range(10):
+        measured = source.measure(natural(13), frame * FRAME_S)
+        one, other = used.update(measured, frame * FRAME_S), new.update(measured, frame * FRAME_S)
+        np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-12)
+        np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-12)
