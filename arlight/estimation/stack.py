@@ -94,11 +94,9 @@ def _radiosity(film: ComplexArray, paper: ComplexArray, block: Block, slab: Slab
     entering[centre - 1, 1:] = film[centre - 1] * np.array([1.0, 1j])
     reflect = _convolution(paper)
     if not bounces:
-        single: ComplexArray = reflect @ entering
-        return single
+        return np.asarray(reflect @ entering, complex)
     returned = _returned_light(film, float(np.hypot(*(block.frequency or (0, 0)))), slab)
-    settled: ComplexArray = np.linalg.solve(np.eye(len(film)) - reflect @ returned, reflect @ entering)
-    return settled
+    return np.asarray(np.linalg.solve(np.eye(len(film)) - reflect @ returned, reflect @ entering), complex)
 
 
 def _returned_light(film: ComplexArray, frequency: float, slab: Slab) -> ComplexArray:
@@ -114,8 +112,7 @@ def _returned_light(film: ComplexArray, frequency: float, slab: Slab) -> Complex
     within = np.abs(a) <= HARMONICS
     film_part = np.where(within, squared[np.clip(a + HARMONICS, 0, 2 * HARMONICS)], 0.0)
     upper = film_part * upper_face_return(slab, frequency * np.abs(2 * k + a))
-    returned: ComplexArray = upper + lower_face_return(slab) * np.eye(len(harmonics), dtype=complex)
-    return returned
+    return np.asarray(upper + lower_face_return(slab) * np.eye(len(harmonics)), complex)
 
 
 def lower_face_return(slab: Slab) -> float:
