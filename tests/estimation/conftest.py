@@ -85,6 +85,17 @@ def blank(probe: Probe) -> Callable[..., BlockMeans]:
 
 
 @pytest.fixture(scope="session")
+def fresnel(probe: Probe) -> Callable[[BlockMeans], np.ndarray]:
+    """(blocks, 1) how strongly each block mirrors toward the camera, relative to their mean."""
+
+    def relative(means: BlockMeans) -> np.ndarray:
+        face = probe.slab.interface_reflectance(means.view_cosine)
+        return (face / face.mean())[:, None]
+
+    return relative
+
+
+@pytest.fixture(scope="session")
 def lit(probe: Probe, response: BlockResponse) -> Callable[..., BlockMeans]:
     """Measurements with light added: coefficients (k, 3), mirrored radiance (blocks, 3) with the lower face's share."""
     blocks = field_blocks(probe)
