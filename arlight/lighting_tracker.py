@@ -114,8 +114,8 @@ class LightingTracker:
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
         last, measured = self._last, 0.0
         for _ in range(1 if last else _FIRST_PASSES):
-            colors, nuisance = (last.colors, last.nuisance) if last else (None, Nuisance(blur_px**2))
-            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, colors)
+            stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
+            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, stripes)
             measured = perf_counter()
             last = self._estimator.estimate(means, frame.time_s, nuisance)
         self._last = last

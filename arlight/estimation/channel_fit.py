@@ -55,8 +55,8 @@ class ChannelFit:
     """(blocks,) smooth reflection field [full scale]."""
     reflection: Array
     """(blocks,) field plus what each block mirrors beside it, such as a lamp."""
-    lit: Array
-    """(blocks, 7) rows that the lighting predicts, blur included."""
+    predicted: Array
+    """(blocks, 7) rows that lighting and reflection predict, blur included."""
     chi2: float
     """Robust chi-square per row; nan when no row was usable."""
     nuisance: Nuisance
@@ -114,7 +114,7 @@ def fit_channel(
         covariance=np.asarray(np.linalg.inv(normal)[:size, :size], float),
         field=field,
         reflection=reflection,
-        lit=lit,
+        predicted=lit + mirror * reflection[:, None],
         chi2=float(np.mean((weights * squared)[usable])) if np.any(usable) else float("nan"),
         nuisance=nuisance,
     )

@@ -19,7 +19,7 @@ from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import unpack_real
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
-from arlight.tracking.block_means import BlockColors, BlockMeans
+from arlight.tracking.block_means import BlockMeans
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,8 @@ class Estimate:
 
     lighting: Lighting
     """Coefficients with covariance."""
-    colors: BlockColors
-    """Colour line of each block, for measuring the next frame."""
+    stripes: Array
+    """(blocks, 7, 3) rows that the estimate predicts, for measuring the next frame [full scale]."""
     reflection: Array
     """(blocks, 3) mirror reflection in the film's upper face [full scale]."""
     nuisance: Nuisance
@@ -79,7 +79,11 @@ class LightingEstimator:
         green = self._fit(means, rows, lower, _GREEN, white, nuisance or Nuisance(), None)
         red, blue = (self._fit(means, rows, lower, channel, white, green.nuisance, green) for channel in (0, 2))
         fits = (red, green, blue)
-        spreads = (self._color_spread(red, green), self._color_spread(blue, green))
+        start = nuisance or Nuisance()
+        spreads = (
+            self._color_spread(red, green, start.color_spread[0]),
+            self._color_spread(blue, green, start.color_spread[1]),
+        )
         lighting = Lighting(
             self._frequencies,
             unpack_real(np.stack([fit.packed for fit in fits], axis=1)),
@@ -87,9 +91,10 @@ class LightingEstimator:
             time_s,
             float(np.mean([fit.chi2 for fit in fits])),
         )
-        reflection = np.stack([red.field, green.reflection, blue.field], axis=1)
+        reflection = np.stack([fit.reflection for fit in fits], axis=1)
+        stripes = np.stack([fit.predicted for fit in fits], axis=2)
         learnt = replace(green.nuisance, color_spread=spreads)
-        return Estimate(lighting, _colors(fits, reflection, white), reflection, learnt)
+        return Estimate(lighting, stripes, reflection, learnt)
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""
@@ -130,16 +135,6 @@ class LightingEstimator:
         )
         return fit_channel(means, channel, level, rows, lower, self._mean_model, system, nuisance)
 
-    def _color_spread(self, fit: ChannelFit, green: ChannelFit) -> float:
+    def _color_spread(self, fit: ChannelFit, green: ChannelFit, last: float) -> float:
         difference = fit.packed - green.packed * (fit.packed[0] / max(green.packed[0], 1e-6))
-        return color_spread(self._frequencies, float(fit.packed[0]), difference, np.diagonal(fit.covariance))
-
-
-def _colors(fits: tuple[ChannelFit, ...], reflection: Array, white: Array) -> BlockColors:
-    """Each block's colour line: from its reflection along the regression of its stripes on green."""
-    swing = np.stack([fit.lit[:, 1:] for fit in fits], axis=-1)
-    green = swing[..., _GREEN : _GREEN + 1]
-    # where a block has next to no stripes its line has the colour of white
-    floor = (0.01 * white[_GREEN]) ** 2
-    slope = (np.sum(swing * green, axis=1) + floor * white / white[_GREEN]) / (np.sum(green**2, axis=1) + floor)
-    return BlockColors(np.maximum(reflection, 1e-5), np.maximum(slope, 1e-3))
+        return color_spread(self._frequencies, float(fit.packed[0]), difference, np.diagonal(fit.covariance), last)

@@ -36,20 +36,27 @@ def color_stddev(frequencies: NDArray[np.int64], irradiance: float, spread: floa
 
 
 def color_spread(
-    frequencies: NDArray[np.int64], irradiance: float, difference: NDArray[np.float64], variance: NDArray[np.float64]
+    frequencies: NDArray[np.int64],
+    irradiance: float,
+    difference: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    last: float,
 ) -> float:
-    """How colourful a scene's light is: the spread under which an estimated difference is most likely.
+    """How colourful a scene's light is: the spread under which the estimated differences are most likely.
 
-    One step of expectation maximisation; repeated frame by frame it converges.
+    A damped step of MacKay's evidence update, which divides by the number of well-determined differences; repeated
+    frame by frame it converges.
 
     Args:
         frequencies, irradiance: as in `color_stddev`.
         difference: (2k - 1,) estimated red or blue coefficients less green's scaled ones.
         variance: (2k - 1,) of that estimate.
+        last: the spread that the estimate was made with.
     """
     unit = color_stddev(frequencies, irradiance, 1.0)[1:]
-    spread = float(np.sqrt(np.mean((difference[1:] ** 2 + variance[1:]) / unit**2)))
-    return min(max(spread, _LEAST_COLOR_SPREAD), 3.0 * COLOR_SPREAD)
+    determined = np.sum(np.clip(1.0 - variance[1:] / (last * unit) ** 2, 0.02, 1.0))
+    spread = float(np.sqrt(np.sum((difference[1:] / unit) ** 2) / determined))
+    return float(np.clip(np.sqrt(spread * last), _LEAST_COLOR_SPREAD, 3.0 * COLOR_SPREAD))
 
 
 def _falling(frequencies: NDArray[np.int64], first_order: float) -> NDArray[np.float64]:

@@ -24,8 +24,9 @@ _SWING_MODEL = 0.001
 """The same in a harmonic that the pixels resolve well."""
 _CODEC = 0.012
 """And in one at half the pixels' frequency, where codecs quantise coarsely; it grows with the frequency's square."""
-_COLOR_SPREAD = 0.2
+_COLOR_SPREAD = 0.05
 """How much the stripes' colour differs between blocks: error of a harmonic that was inferred from luma."""
+_LEAST_TRUST = 0.02
 _CHROMA_MEAN = 0.001
 """Error of a mean of red or blue that comes from subsampled, coarsely quantised chroma: an eighth of a level."""
 
@@ -51,4 +52,6 @@ def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Arra
         inferred = _COLOR_SPREAD * (1.0 - means.color_trust)
         swing = np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel])
         variance[:, 1:] += (inferred[:, None] * np.repeat(swing, 2, axis=1)) ** 2
+        # what was inferred repeats the last estimate; only the share that was seen tells something new
+        variance[:, 1:] /= np.maximum(means.color_trust, _LEAST_TRUST)[:, None] ** 2
     return variance

@@ -15,6 +15,8 @@ from arlight.video.writer import VideoWriter
 
 CRF = 16
 PRESET = "slow"
+TUNE = "psnr"
+"""Measured values matter more than looks, and nobody waits for the frames."""
 
 
 def write_clip(
@@ -62,7 +64,7 @@ def write_clip(
     _write_sidecar(folder, name, "probe", lambda path: save_probe(probe, path))
     _write_sidecar(folder, name, "camera", settings.filming_camera.save)
     try:
-        with VideoWriter(video, frame_rate=settings.frame_rate, crf=crf, preset=preset) as writer:
+        with VideoWriter(video, frame_rate=settings.frame_rate, crf=crf, preset=preset, tune=TUNE) as writer:
             for synthetic in chain([first], source):
                 writer.write(synthetic.frame)
                 frames.append(synthetic.truth)

@@ -207,45 +207,56 @@ def block_average(values, first, average):
 
 
 @njit(cache=True)
-def expected_chroma(ycc, first, line_luma, line_chroma, expected):
-    """Chroma (n, 2) of each pixel from its luma, on its block's colour line.
-
-    Args:
-        line_luma: (b, k) increasing luma of the line's nodes; line_chroma: (b, k, 2) their chroma.
-    """
-    nodes = line_luma.shape[1]
+def flatten_chroma(first, flat, expected):
+    """Chroma 0 for the pixels of blocks of one colour: their own mean is all that is to be known."""
     for block in range(first.shape[0] - 1):
-        luma = line_luma[block]
-        for i in range(first[block], first[block + 1]):
-            y = ycc[i, 0]
-            low, high = 0, nodes - 1
-            while high - low > 1:
-                middle = (low + high) // 2
-                if luma[middle] <= y:
-                    low = middle
-                else:
-                    high = middle
-            span = luma[high] - luma[low]
-            t = min(max((y - luma[low]) / span, 0.0), 1.0) if span > 0.0 else 0.0
-            for c in range(2):
-                expected[i, c] = (1.0 - t) * line_chroma[block, low, c] + t * line_chroma[block, high, c]
+        if flat[block]:
+            expected[first[block] : first[block + 1]] = 0.0
 
 
 @njit(cache=True)
-def correct_chroma(ycc, first, phases, expected, shift, swing, dark_luma):
+def modelled_chroma(ycc, first, phases, stripes, ycc_from_rgb, encoding, expected):
+    """Chroma (n, 2) of each pixel from the radiance (b, 7, 3) that a model gives its block at the pixel's phase.
+
+    Where the pixel is brighter or darker than the model its chroma is taken to scale with its luma. `encoding` holds
+    encoded values over the square root of linear light.
+    """
+    last = encoding.shape[0] - 1
+    for block in range(first.shape[0] - 1):
+        for i in range(first[block], first[block + 1]):
+            c1, s1 = np.cos(phases[i]), np.sin(phases[i])
+            c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
+            c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
+            luma, blue, red = 0.0, 0.0, 0.0
+            for k in range(3):
+                v = stripes[block, :, k]
+                light = v[0] + v[1] * c1 + v[2] * s1 + v[3] * c2 + v[4] * s2 + v[5] * c3 + v[6] * s3
+                x = np.sqrt(min(max(light, 0.0), 1.0)) * last
+                j = min(int(x), last - 1)
+                e = encoding[j] + (x - j) * (encoding[j + 1] - encoding[j])
+                luma += ycc_from_rgb[0, k] * e
+                blue += ycc_from_rgb[1, k] * e
+                red += ycc_from_rgb[2, k] * e
+            scale = min(max(ycc[i, 0] / max(luma, 0.02), 0.5), 2.0)
+            expected[i, 0] = scale * blue
+            expected[i, 1] = scale * red
+
+
+@njit(cache=True)
+def correct_chroma(ycc, first, phases, expected, shift, swing):
     """Replace the chroma in ycc (n, 3) by the expected one plus its block's correction.
 
-    The correction's mean `shift` (b, 2) grows with the pixel's distance from the block's dark end, because colour
-    differences scale with the light; `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
+    The correction's mean `shift` (b, 2) grows with the pixel's luma, because colour differences scale with the light;
+    `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
     """
     for block in range(first.shape[0] - 1):
         start, stop = first[block], first[block + 1]
         total = 0.0
         for i in range(start, stop):
-            total += max(ycc[i, 0] - dark_luma[block], 0.0) + 0.02
+            total += max(ycc[i, 0], 0.0) + 0.02
         mean = total / max(stop - start, 1)
         for i in range(start, stop):
-            weight = (max(ycc[i, 0] - dark_luma[block], 0.0) + 0.02) / mean
+            weight = (max(ycc[i, 0], 0.0) + 0.02) / mean
             c, s = np.cos(phases[i]), np.sin(phases[i])
             for k in range(2):
                 ycc[i, 1 + k] = (

@@ -37,13 +37,3 @@ class BlockMeans:
     """(blocks, 2) frequency of the stripes in the image [1/px]."""
     color_trust: NDArray[np.float64]
     """(blocks,) how far the harmonics of red and blue were seen rather than inferred from luma, 0 to 1."""
-
-
-@dataclass(frozen=True, slots=True)
-class BlockColors:
-    """The line in linear RGB on which each block's pixels are expected; guides what subsampled chroma cannot show."""
-
-    dark: NDArray[np.float64]
-    """(blocks, 3) radiance of the darkest pixels: the mirror reflection [full scale]."""
-    slope: NDArray[np.float64]
-    """(blocks, 3) direction of the line, any length: the colour of the stripes."""

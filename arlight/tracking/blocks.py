@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.probe.design import Probe
 from arlight.tracking import block_kernels as kernels
-from arlight.tracking.block_color import chroma_correction, color_lines
+from arlight.tracking.block_color import chroma_correction, color_line
 from arlight.tracking.block_layout import BlockLayout, BlockView, field_blocks
-from arlight.tracking.block_means import ROWS, BlockColors, BlockMeans
-from arlight.video.conversion import decoding_table
+from arlight.tracking.block_means import ROWS, BlockMeans
+from arlight.video.conversion import decoding_table, encoding_table
 from arlight.video.frame import Frame
 
 Array = NDArray[np.float64]
@@ -61,15 +61,14 @@ class BlockMeter:
         self._first = np.empty(count + 1, np.int64)
         self._views = np.empty((count, 3))
 
-    def measure(self, frame: Frame, pose: Pose, blur_px: float = 0.6, colors: BlockColors | None = None) -> BlockMeans:
+    def measure(self, frame: Frame, pose: Pose, blur_px: float = 0.6, stripes: Array | None = None) -> BlockMeans:
         """Means and harmonics of every block, in linear light.
 
         Args:
             frame: the picture; its size is the camera's.
             pose: camera_from_probe.
             blur_px: standard deviation of the picture's blur [px].
-            colors: where the blocks' pixels lie in RGB, from an earlier estimate; read off the reference regions
-                when not given.
+            stripes: (blocks, 7, 3) rows that the last estimate predicts; guide what subsampled chroma cannot show.
 
         Returns:
             The measurements, in the order of `field_blocks(probe)`.
@@ -79,7 +78,7 @@ class BlockMeter:
         self._read(frame, count)
         trust = np.ones(len(self._first) - 1)
         if max(frame.format.chroma_shift) > 0:
-            trust = self._infer_chroma(frame, view, count, colors)
+            trust = self._infer_chroma(frame, view, count, stripes)
         table = decoding_table(frame.format.transfer)[:-1]
         matrix = frame.format.rgb_from_ycc().astype(float)
         kernels.linearise(self._encoded, count, matrix, table, self._linear)
@@ -116,29 +115,30 @@ class BlockMeter:
                     plane, shift_x, shift_y, width, self._pixels, count, neutral, 1.0 / swing, c, self._encoded
                 )
 
-    def _infer_chroma(self, frame: Frame, view: BlockView, count: int, colors: BlockColors | None) -> Array:
-        """Bring chroma to full resolution along the blocks' colour lines; returns how far it was seen."""
-        average = np.empty((len(self._patterned), 3))
-        kernels.block_average(self._encoded[:count], self._first, average)
-        if colors is None:
-            colors = self._reference_colors(average, frame)
-        matrix = frame.format.ycc_from_rgb().astype(float)
-        luma, chroma = color_lines(colors, frame.format.transfer, matrix)
-        # blocks without stripes have one colour: their line is a point, and their own mean corrects it
-        chroma[~self._patterned] = 0.0
+    def _infer_chroma(self, frame: Frame, view: BlockView, count: int, stripes: Array | None) -> Array:
+        """Bring chroma to full resolution along the blocks' stripes; returns how far it was seen."""
         self._chroma[:count, :2] = self._encoded[:count, 1:]
         expected = self._chroma[:count, 2:]
-        kernels.expected_chroma(self._encoded, self._first, luma, chroma, expected)
-        first_harmonic = np.minimum(view.harmonics, 1)
+        matrix = frame.format.ycc_from_rgb().astype(float)
+        transfer = frame.format.transfer
+        if stripes is None:
+            luma, chroma = color_line(*self._reference_colors(count, frame), transfer, matrix)
+            for c in range(2):
+                expected[:, c] = np.interp(self._encoded[:count, 0], luma, chroma[:, c])
+        else:
+            kernels.modelled_chroma(
+                self._encoded, self._first, self._phases, stripes, matrix, encoding_table(transfer)[:-1], expected
+            )
+        kernels.flatten_chroma(self._first, ~self._patterned, expected)
         self._used[:count] = True
-        fitted = self._solve(self._chroma, first_harmonic).coefficients
+        fitted = self._solve(self._chroma, np.minimum(view.harmonics, 1)).coefficients
         swing = fitted[:, 1] - 1j * fitted[:, 2]
         mean = np.empty((len(self._patterned), 4))
         kernels.block_average(self._chroma[:count], self._first, mean)
-        correction = chroma_correction(swing[:, :2], swing[:, 2:], mean[:, :2] - mean[:, 2:], view.cycles_per_px)
-        kernels.correct_chroma(
-            self._encoded, self._first, self._phases, expected, correction.shift, correction.swing, luma[:, 0]
+        correction = chroma_correction(
+            swing[:, :2], swing[:, 2:], mean[:, :2] - mean[:, 2:], view.cycles_per_px, _displacement_px(frame)
         )
+        kernels.correct_chroma(self._encoded, self._first, self._phases, expected, correction.shift, correction.swing)
         return correction.trust
 
     def _ceiling(self, count: int) -> Array:
@@ -153,17 +153,17 @@ class BlockMeter:
             ceiling[~self._white] = np.minimum(level, _CLIP)
         return ceiling
 
-    def _reference_colors(self, average: Array, frame: Frame) -> BlockColors:
-        """One dark and one white colour for the whole sheet, from the reference regions."""
+    def _reference_colors(self, count: int, frame: Frame) -> tuple[Array, Array]:
+        """Linear RGB of a black and of a white region, medians over the sheet."""
+        average = np.empty((len(self._patterned), 3))
+        kernels.block_average(self._encoded[:count], self._first, average)
         table = decoding_table(frame.format.transfer)[:-1]
         encoded = np.clip(average @ frame.format.rgb_from_ycc().astype(float).T, 0.0, 1.0)
         linear = np.interp(encoded, np.linspace(0.0, 1.0, len(table)), table)
         seen = np.diff(self._first) >= _MIN_SAMPLES
         black, white = linear[self._black & seen], linear[self._white & seen & (linear.max(axis=1) < _CLIP)]
         dark = np.median(black, axis=0) if len(black) else np.zeros(3)
-        bright = np.median(white, axis=0) if len(white) else linear[seen].max(axis=0, initial=1e-3)
-        ones = np.ones((len(average), 1))
-        return BlockColors(ones * np.maximum(dark, 1e-5), ones * np.maximum(bright - dark, 1e-4))
+        return dark, np.median(white, axis=0) if len(white) else linear[seen].max(axis=0, initial=1e-3)
 
     def _solve(self, values: Array, harmonics: NDArray[np.int64]) -> "_Fit":
         """Fit all blocks with a linear shading."""
@@ -200,6 +200,12 @@ class BlockMeter:
             cycles_per_px=view.cycles_per_px,
             color_trust=trust,
         )
+
+
+def _displacement_px(frame: Frame) -> Array:
+    """(2,) mean vector from a pixel to the chroma sample that it shares [px]."""
+    shared = 2.0 ** np.array(frame.format.chroma_shift)
+    return np.array(frame.format.chroma_offset_px) - (shared - 1.0) / 2.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,7 @@ class VideoWriter:
         crf: int = 18,
         preset: str = "ultrafast",
         audio: bool = True,
+        tune: str = "zerolatency",
     ) -> None:
         """Checks that the output could be written.
 
@@ -64,6 +65,8 @@ class VideoWriter:
             crf: quality of libx264, 0 to 51, lower is better.
             preset: speed of libx264, `ultrafast` to `veryslow`.
             audio: copy the source's sound.
+            tune: tuning of libx264; `psnr` keeps measured values best, but holds frames back, so that a file that is
+                cut off lacks its last second.
 
         Raises:
             OutputError: the output is the source, is a folder, its folder is missing or not writable, or its container
@@ -74,7 +77,8 @@ class VideoWriter:
         self._like, self._audio_wanted = like, audio
         self._rate = Fraction(frame_rate or (like.frame_rate if like else 30))
         self._time_base = like.time_base if like else DEFAULT_TIME_BASE
-        self._options = {"preset": preset, "crf": str(crf), "tune": "zerolatency"}
+        # no reordered frames: the container loses the last of them
+        self._options = {"preset": preset, "crf": str(crf), "tune": tune, "bf": "0"}
         self._container: OutputContainer | None = None
         self._audio: AudioCopy | None = None
         self._failed = False
