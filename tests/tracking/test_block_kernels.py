@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from arlight.color import linear_from_encoded
+from arlight.color import encoded_from_linear, linear_from_encoded
 from arlight.probe.layout import design_probe
 from arlight.tracking import block_kernels as kernels
 from arlight.tracking.block_layout import BlockLayout
-from arlight.video.conversion import decoding_table
+from arlight.video.conversion import decoding_table, encoding_table
 from arlight.video.pixel_format import PixelFormat
 
 PROBE = design_probe(order=2)
@@ -259,15 +259,45 @@ def test_corrected_chroma_has_the_asked_mean_and_grows_with_the_light():
     expected = generator.normal(size=(400, 2)) * 0.01
     shift, none = np.array([[0.03, -0.02]]), np.zeros((1, 2, 2))
     ycc = np.column_stack([luma, np.full((400, 2), 9.0)])
-    kernels.correct_chroma(ycc, first, phases, expected, shift, none, np.array([0.1]))
+    kernels.correct_chroma(ycc, first, phases, expected, shift, none)
     np.testing.assert_array_equal(ycc[:, 0], luma)
     np.testing.assert_allclose((ycc[:, 1:] - expected).mean(axis=0), shift[0], atol=1e-12)
     added = np.abs(ycc[:, 1:] - expected)[np.argsort(luma)]
     assert np.all(np.diff(added, axis=0) >= 0.0)
     swing = np.array([[[0.02, 0.01], [0.0, -0.03]]])
-    kernels.correct_chroma(ycc, first, phases, expected, np.zeros((1, 2)), swing, np.array([0.1]))
+    kernels.correct_chroma(ycc, first, phases, expected, np.zeros((1, 2)), swing)
     turning = np.column_stack([np.cos(phases), np.sin(phases)])
     np.testing.assert_allclose(ycc[:, 1:] - expected, turning @ swing[0].T, atol=1e-12)
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "bt709", "hlg"])
+def test_modelled_chroma_is_that_of_the_models_light_at_each_pixels_phase(transfer):
+    generator = np.random.default_rng(17)
+    first = np.array([0, 150, 400])
+    phases = generator.uniform(0, 2 * np.pi, 400)
+    stripes = 0.04 * generator.normal(size=(2, 7, 3))
+    stripes[:, 0] = [[0.5, 0.3, 0.25], [0.3, 0.35, 0.6]]
+    matrix = PixelFormat("bt709", False, 8).ycc_from_rgb().astype(float)
+    waves = np.column_stack([np.ones(400), *(f(m * phases) for m in (1, 2, 3) for f in (np.cos, np.sin))])
+    linear = np.concatenate([waves[:150] @ stripes[0], waves[150:] @ stripes[1]])
+    ycc = encoded_from_linear(linear, transfer).astype(float) @ matrix.T
+    expected = np.empty((400, 2))
+    table = encoding_table(transfer)[:-1]
+    kernels.modelled_chroma(ycc, first, phases, stripes, matrix, table, expected)
+    np.testing.assert_allclose(expected, ycc[:, 1:], atol=2e-4)
+    # a pixel in shadow keeps its hue
+    dimmed = ycc * 0.8
+    kernels.modelled_chroma(dimmed, first, phases, stripes, matrix, table, expected)
+    np.testing.assert_allclose(expected, dimmed[:, 1:], atol=2e-4)
+
+
+def test_of_blocks_of_one_colour_nothing_is_expected_but_their_own_mean():
+    generator = np.random.default_rng(18)
+    chroma, first = generator.normal(size=(90, 2)), np.array([0, 30, 30, 90])
+    flat = chroma.copy()
+    kernels.flatten_chroma(first, np.array([True, True, False]), flat)
+    assert np.all(flat[:30] == 0.0)
+    np.testing.assert_array_equal(flat[30:], chroma[30:])
 
 
 @pytest.mark.parametrize("transfer", ["srgb", "bt709", "hlg", "gamma28", "linear"])
