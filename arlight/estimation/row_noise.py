@@ -29,6 +29,8 @@ _COLOR_SPREAD = 0.05
 _LEAST_TRUST = 0.02
 _CHROMA_MEAN = 0.001
 """Error of a mean of red or blue that comes from subsampled, coarsely quantised chroma: an eighth of a level."""
+_CHROMA_SWING = 0.004
+"""The same of a harmonic."""
 
 
 def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Array) -> Array:
@@ -48,7 +50,9 @@ def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Arra
     cycles = np.hypot(*means.cycles_per_px.T)[:, None] * order
     variance[:, 1:] += (white * (_SWING_MODEL + _CODEC * (2.0 * cycles) ** 2)) ** 2
     if channel != 1:
-        variance[:, 0] += np.where(means.color_trust < 1.0, (_CHROMA_MEAN * white) ** 2, 0.0)
+        subsampled = np.where(means.color_trust < 1.0, white, 0.0)
+        variance[:, 0] += (_CHROMA_MEAN * subsampled) ** 2
+        variance[:, 1:] += (_CHROMA_SWING * subsampled[:, None]) ** 2
         inferred = _COLOR_SPREAD * (1.0 - means.color_trust)
         swing = np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel])
         variance[:, 1:] += (inferred[:, None] * np.repeat(swing, 2, axis=1)) ** 2
