@@ -1,4 +1,7 @@
-"""What can be wrong with what the program was given. Every message says what was expected, what was found, what to do."""
+"""What can be wrong with what the program was given.
+
+Every message says what was expected, what was found, what to do.
+"""
 
 
 class ArlightError(Exception):
@@ -29,5 +32,5 @@ class OutputError(ArlightError):
     """An output that cannot be written, or that would destroy an input."""
 
 
-class RenderingUnavailable(ArlightError):
+class RenderingUnavailableError(ArlightError):
     """No headless OpenGL on this machine; estimation still works."""

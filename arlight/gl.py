@@ -5,7 +5,7 @@ from pathlib import Path
 
 import moderngl
 
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 
 _PACKAGES = "libegl1 libgl1-mesa-dri"
 
@@ -14,13 +14,13 @@ def create_context() -> moderngl.Context:
     """A new headless context that belongs to the calling thread.
 
     Raises:
-        RenderingUnavailable: there is no EGL driver; says which packages to install.
+        RenderingUnavailableError: there is no EGL driver; says which packages to install.
     """
     try:
         return moderngl.create_standalone_context(require=330, backend="egl")  # type: ignore[arg-type]
     # moderngl and glcontext raise bare Exception when the library or a driver is missing
     except Exception as error:
-        raise RenderingUnavailable(
+        raise RenderingUnavailableError(
             f"headless OpenGL 3.3 through EGL is needed for rendering and was not found ({error}); "
             f"on Debian: apt-get install {_PACKAGES}; estimation alone works without it (--no-render)"
         ) from error
@@ -33,4 +33,4 @@ def shader_source(name: str) -> str:
         path = folder / name
         if path.is_file():
             return path.read_text()
-    raise RenderingUnavailable(f"the shader {name} is missing from this installation; reinstall arlight")
+    raise RenderingUnavailableError(f"the shader {name} is missing from this installation; reinstall arlight")

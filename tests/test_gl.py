@@ -5,7 +5,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 from arlight.gl import create_context, shader_source
 
 SHADERS = Path(__file__).parent.parent / "shaders"
@@ -15,7 +15,7 @@ def colour_drawn(colour):
     """Clears a small buffer with a colour in a context of its own and reads it back."""
     try:
         context = create_context()
-    except RenderingUnavailable as error:
+    except RenderingUnavailableError as error:
         pytest.skip(str(error))
     with context:
         buffer = context.framebuffer([context.renderbuffer((4, 3), 3, dtype="f4")])
@@ -41,7 +41,9 @@ def test_without_a_driver_the_message_says_what_to_install(monkeypatch):
         raise Exception("libEGL.so.1 not loaded")
 
     monkeypatch.setattr(moderngl, "create_standalone_context", fail)
-    with pytest.raises(RenderingUnavailable, match=r"libEGL.so.1 not loaded.*apt-get install libegl1.*--no-render"):
+    with pytest.raises(
+        RenderingUnavailableError, match=r"libEGL.so.1 not loaded.*apt-get install libegl1.*--no-render"
+    ):
         create_context()
 
 
@@ -51,5 +53,5 @@ def test_shaders_are_found(name):
 
 
 def test_a_missing_shader_is_named():
-    with pytest.raises(RenderingUnavailable, match=r"nothing\.frag is missing"):
+    with pytest.raises(RenderingUnavailableError, match=r"nothing\.frag is missing"):
         shader_source("nothing.frag")

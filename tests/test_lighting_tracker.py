@@ -8,7 +8,7 @@ import pytest
 
 from arlight.camera import Camera
 from arlight.color import encoded_from_linear
-from arlight.errors import CameraError, RenderingUnavailable
+from arlight.errors import CameraError, RenderingUnavailableError
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.layout import design_probe
 from arlight.synthetic.settings import SynthesisSettings, default_camera
@@ -39,7 +39,7 @@ def film(layers):
             settings = SynthesisSettings(camera=CAMERA, sheet_width_px=430.0, **(base | changes))
             try:
                 made[key] = list(synthesize(settings, PROBE, layers))
-            except RenderingUnavailable as error:
+            except RenderingUnavailableError as error:
                 pytest.skip(f"no headless OpenGL through EGL: {error}")
         return made[key]
 

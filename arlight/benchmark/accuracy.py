@@ -61,7 +61,7 @@ def accuracy_table(settings: AccuracySettings, probe: Probe) -> Iterator[Accurac
         One cell for each tilt and width, tilts outermost.
 
     Raises:
-        RenderingUnavailable: there is no headless OpenGL.
+        RenderingUnavailableError: there is no headless OpenGL.
     """
     layers = SheetLayers.of_probe(probe)
     for tilt in settings.tilts_deg:

@@ -29,7 +29,7 @@ def make_relighter(options: RelightingOptions, probe: Probe, camera: Camera) -> 
 
     Raises:
         MeshError: the object cannot be used.
-        RenderingUnavailable: there is no headless OpenGL.
+        RenderingUnavailableError: there is no headless OpenGL.
     """
     mesh = default_object() if options.object is None else load_mesh(options.object)
     with Progress(console=Console(stderr=True), transient=True) as progress:

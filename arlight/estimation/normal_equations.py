@@ -54,8 +54,7 @@ class BlockSystem:
         right[c:] = products[:, 3, 4] @ basis
         normal[np.diag_indices_from(normal)] += self._prior
         right += self._prior * self._expected
-        solution: Array = np.linalg.solve(normal, right)
-        return solution, normal
+        return np.asarray(np.linalg.solve(normal, right), float), normal
 
     def field(self, solution: Array) -> Array:
         """Reflection field (blocks,) of a solution."""

@@ -39,7 +39,7 @@ class ObjectRenderer:
             supersampling: samples along a pixel's side.
 
         Raises:
-            RenderingUnavailable: no headless OpenGL.
+            RenderingUnavailableError: no headless OpenGL.
         """
         self._transfer, self._gloss_rows = transfer, gloss_rows
         self._thread = threading.get_ident()

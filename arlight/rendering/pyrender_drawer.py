@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 from arlight.rendering.directional import directional_lights
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.projection import View
@@ -46,7 +46,7 @@ class PyrenderDrawer:
             roughness: perceptual roughness.
 
         Raises:
-            RenderingUnavailable: pyrender or its OpenGL platform cannot be loaded.
+            RenderingUnavailableError: pyrender or its OpenGL platform cannot be loaded.
         """
         self._thread = threading.get_ident()
         self._reconstruction, self._camera = reconstruction, camera
@@ -125,7 +125,7 @@ def _load_pyrender() -> Any:
     try:
         import pyrender
     except (ImportError, AttributeError, OSError) as error:
-        raise RenderingUnavailable(
+        raise RenderingUnavailableError(
             f"pyrender could not be loaded ({error}); install it and libegl1, or use --renderer moderngl"
         ) from error
     if not hasattr(np, "infty"):
@@ -143,7 +143,7 @@ def _offscreen(pyrender: Any) -> Any:
         offscreen = pyrender.OffscreenRenderer(_TILE_PX, _TILE_PX)
     # pyrender asserts that EGL answers, PyOpenGL looks up functions of a library that may be missing
     except (OpenGLError, AssertionError, AttributeError, ImportError, OSError, ValueError) as error:
-        raise RenderingUnavailable(
+        raise RenderingUnavailableError(
             f"pyrender found no OpenGL through EGL ({error}); install libegl1 or use --renderer moderngl"
         ) from error
     platform = offscreen._platform

@@ -102,7 +102,7 @@ class Relighter:
 
         Raises:
             MeshError: the object cannot be placed.
-            RenderingUnavailable: no headless OpenGL.
+            RenderingUnavailableError: no headless OpenGL.
         """
         self.settings = settings or RelightSettings()
         s = self.settings

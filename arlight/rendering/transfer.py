@@ -52,7 +52,7 @@ def precompute_transfer(
         progress: called with the share done, from 0 to 1.
 
     Raises:
-        RenderingUnavailable: no headless OpenGL.
+        RenderingUnavailableError: no headless OpenGL.
     """
     upper, lower = hemisphere_points(directions), hemisphere_points(max(directions // 4, 1)) * [1.0, 1.0, -1.0]
     lifted = mesh.vertices_mm + mesh.normals * surface_offset_mm(mesh)

@@ -50,7 +50,7 @@ def write_clip(
     Raises:
         OutputError: the clip is there already, or a file cannot be written.
         EnvironmentMapError: the light cannot be loaded.
-        RenderingUnavailable: there is no headless OpenGL.
+        RenderingUnavailableError: there is no headless OpenGL.
     """
     folder = _made(Path(folder))
     video, truth_file = folder / f"{name}.mp4", folder / f"{name}.truth.json"

@@ -50,7 +50,7 @@ class SheetRenderer:
             sampling: how finely a pixel is sampled.
 
         Raises:
-            RenderingUnavailable: there is no headless OpenGL.
+            RenderingUnavailableError: there is no headless OpenGL.
         """
         self._camera = camera
         self._sampling = sampling or Sampling()

@@ -36,7 +36,7 @@ class Stage:
             sampling: how finely a pixel is sampled.
 
         Raises:
-            RenderingUnavailable: there is no headless OpenGL.
+            RenderingUnavailableError: there is no headless OpenGL.
         """
         self._script = script
         self._transport = LightTransport(layers, slab, bounces)

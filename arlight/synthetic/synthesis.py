@@ -46,7 +46,7 @@ def synthesize(
 
     Raises:
         EnvironmentMapError: the light cannot be loaded.
-        RenderingUnavailable: there is no headless OpenGL.
+        RenderingUnavailableError: there is no headless OpenGL.
     """
     camera = settings.filming_camera
     captured = captured_light(settings)

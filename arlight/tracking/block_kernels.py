@@ -77,8 +77,9 @@ def fit(
         degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
 
     Fills coefficients (b, 7, r) and their covariance (b, 7, 7) for unit variance, variance (b, r) of a pixel about the
-    fit, shading (b, r), the slope from the block's middle to its border, samples (b,); blocks with too few pixels get 0 samples. The polynomial's constant is the mean over the middle
-    of the block's symmetric window, which is what the block's mean is without stripes.
+    fit, shading (b, r), the slope from the block's middle to its border, samples (b,); blocks with too few pixels get
+    0 samples. The polynomial's constant is the mean over the middle of the block's symmetric window, which is what the
+    block's mean is without stripes.
     """
     rights = values.shape[1]
     normal = np.empty((MAX_COLUMNS, MAX_COLUMNS))

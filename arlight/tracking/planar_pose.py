@@ -37,7 +37,8 @@ def planar_poses(camera: Camera, points_mm: Array, pixels: Array, markers: int =
         markers: how many markers they belong to.
 
     Returns:
-        Up to two hypotheses with the camera above the sheet, one where refinement leads both to the same; none where the points are degenerate.
+        Up to two hypotheses with the camera above the sheet, one where refinement leads both to the same; none where
+        the points are degenerate.
 
     Source: Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
     """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arlight.camera import Camera, Pose
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import half_plane_frequencies
 from arlight.gl import create_context
@@ -18,7 +18,7 @@ def gl():
     """Skips where there is no headless OpenGL; nothing else does."""
     try:
         create_context().release()
-    except RenderingUnavailable as error:
+    except RenderingUnavailableError as error:
         pytest.skip(str(error))
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 from arlight.gl import create_context
 
 
@@ -10,5 +10,5 @@ from arlight.gl import create_context
 def needs_opengl():
     try:
         create_context().release()
-    except RenderingUnavailable as error:
+    except RenderingUnavailableError as error:
         pytest.skip(f"no headless OpenGL through EGL: {error}")

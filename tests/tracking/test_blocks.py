@@ -9,7 +9,7 @@ import pytest
 from arlight.camera import Pose
 from arlight.color import encoded_from_linear
 from arlight.environment import Environment
-from arlight.errors import RenderingUnavailable
+from arlight.errors import RenderingUnavailableError
 from arlight.probe.layout import design_probe
 from arlight.synthetic.light_script import LightScript, exposure_for
 from arlight.synthetic.motion import CameraMotion
@@ -57,7 +57,7 @@ def picture(layers):
             script = script.scaled(exposure_for(script, PROBE.paper_reflectance, white))
             try:
                 stage = Stage(layers, PROBE.slab, CAMERA, script)
-            except RenderingUnavailable as error:
+            except RenderingUnavailableError as error:
                 pytest.skip(f"no headless OpenGL through EGL: {error}")
             taken[key] = stage.picture(0.0, pose)
             stage.close()
