@@ -92,7 +92,7 @@ class LightingEstimator:
             float(np.mean([fit.chi2 for fit in fits])),
         )
         reflection = np.stack([fit.reflection for fit in fits], axis=1)
-        stripes = np.stack([fit.predicted for fit in fits], axis=2)
+        stripes = _guide(np.stack([fit.predicted for fit in fits], axis=2), white)
         learnt = replace(green.nuisance, color_spread=spreads)
         return Estimate(lighting, stripes, reflection, learnt)
 
@@ -138,3 +138,20 @@ class LightingEstimator:
     def _color_spread(self, fit: ChannelFit, green: ChannelFit, last: float) -> float:
         difference = fit.packed - green.packed * (fit.packed[0] / max(green.packed[0], 1e-6))
         return color_spread(self._frequencies, float(fit.packed[0]), difference, np.diagonal(fit.covariance), last)
+
+
+def _guide(predicted: Array, white: Array) -> Array:
+    """Rows (blocks, 7, 3) to expect in the next frame, with each block's stripes of one colour.
+
+    Red and blue stripes are those of green, scaled: what differs in shape comes from chroma, and expecting it again
+    would let its errors feed themselves.
+    """
+    green = predicted[:, 1:, _GREEN : _GREEN + 1]
+    # where a block has next to no stripes they are taken to have the colour of white
+    floor = (0.01 * white[_GREEN]) ** 2
+    slope = (np.sum(predicted[:, 1:] * green, axis=1) + floor * white / white[_GREEN]) / (
+        np.sum(green**2, axis=1) + floor
+    )
+    guide = predicted.copy()
+    guide[:, 1:] = green * slope[:, None]
+    return guide

@@ -64,7 +64,7 @@ def learnt(truth, noise, start=COLOR_SPREAD, frames=400):
     for _ in range(frames):
         prior = (found * unit) ** 2
         share = prior / (prior + (noise * unit) ** 2)
-        found = color_spread(FREQUENCIES, 2.0, share * observed, share * (noise * unit) ** 2)
+        found = color_spread(FREQUENCIES, 2.0, share * observed, share * (noise * unit) ** 2, found)
     return found, np.sqrt(np.mean((colour / unit)[1:] ** 2))
 
 
@@ -83,7 +83,7 @@ def test_where_it_starts_does_not_matter():
 
 def test_learnt_colourfulness_stays_within_reason():
     nothing = np.zeros(len(ORDERS))
-    least = color_spread(FREQUENCIES, 1.0, nothing, nothing)
+    least = color_spread(FREQUENCIES, 1.0, nothing, nothing, COLOR_SPREAD)
     most = color_spread(FREQUENCIES, 1.0, np.full(len(ORDERS), 1e6), nothing)
     assert 0 < least < 0.1 * COLOR_SPREAD
     assert COLOR_SPREAD < most < 1.0
@@ -93,4 +93,4 @@ def test_the_means_difference_is_no_colourfulness():
     first, variance = np.zeros(len(ORDERS)), np.full(len(ORDERS), 1e-4)
     moved = first.copy()
     moved[0] = 100.0
-    assert color_spread(FREQUENCIES, 1.0, moved, variance) == color_spread(FREQUENCIES, 1.0, first, variance)
+    assert color_spread(FREQUENCIES, 1.0, moved, variance, COLOR_SPREAD) == color_spread(FREQUENCIES, 1.0, first, variance, COLOR_SPREAD)
