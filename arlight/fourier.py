@@ -35,6 +35,20 @@ def frequency_order(frequencies: ArrayLike) -> NDArray[np.int64]:
     return np.ceil(np.sqrt(np.sum(n**2, axis=-1)) - 1e-9).astype(np.int64)
 
 
+def orders_up_to(frequencies: ArrayLike, order: int) -> NDArray[np.bool_]:
+    """(k,) which of a sheet's frequencies (k, 2) have an order of at most `order`.
+
+    Raises:
+        ProbeError: the order is negative or beyond the highest one.
+    """
+    orders = frequency_order(frequencies)
+    if not 0 <= order <= orders.max():
+        raise ProbeError(
+            f"order {order} was asked for: the sheet measures orders 0 to {orders.max()}; choose among those"
+        )
+    return orders <= order
+
+
 def analyse(light: ArrayLike, light_plane: ArrayLike, frequencies: ArrayLike) -> NDArray[np.complex128]:
     """Fourier coefficients of light given as point masses on the light plane.
 

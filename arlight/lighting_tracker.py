@@ -11,6 +11,7 @@ from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
+from arlight.fourier import orders_up_to
 from arlight.probe.design import Probe
 from arlight.tracking.blocks import BlockMeter
 from arlight.tracking.luma import luma_codes
@@ -33,6 +34,9 @@ class TrackerSettings:
     """Average over time; without it every frame stands alone."""
     bounces: bool = True
     """Model the light reflected between paper and glass; off only for sheets without it."""
+    order: int | None = None
+    """Highest order of the lighting that is told; the sheet's by default. What lies beyond is still fitted, so that it
+    does not pass for light of a lower order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,9 @@ class FrameEstimate:
     """This frame's own estimate; None when the sheet was not seen."""
     timings_s: dict[str, float] = field(default_factory=dict)
     """Wall time of each stage [s]."""
+    unexplained: float = float("nan")
+    """Share of the stripes in this frame that the probe does not explain under any light, 0 to about 1; nan where no
+    stripes are resolved."""
 
 
 class LightingTracker:
@@ -62,11 +69,13 @@ class LightingTracker:
         settings: choices that trade speed for accuracy.
 
     Raises:
-        ProbeError: the sheet's fiducials are unknown to ArUco.
+        ProbeError: the sheet's fiducials are unknown to ArUco, or it does not measure the order that is asked for.
     """
 
     def __init__(self, probe: Probe, camera: Camera, settings: TrackerSettings | None = None) -> None:
         self._settings = settings or TrackerSettings()
+        if self._settings.order is not None:
+            orders_up_to(probe.frequencies, self._settings.order)
         self._tracker = PoseTracker(probe, camera)
         self._meter = BlockMeter(probe, camera, self._settings.samples_per_block)
         self._estimator = LightingEstimator(probe, bounces=self._settings.bounces)
@@ -94,7 +103,8 @@ class LightingTracker:
         codes, table = luma_codes(frame)
         pose = self._tracker.update(codes, frame.time_s, table)
         tracked = perf_counter()
-        raw, measured = self._estimate(frame, pose)
+        estimate, measured = self._estimate(frame, pose)
+        raw = None if estimate is None else self._cut(estimate.lighting)
         estimated = perf_counter()
         lighting = self._filter.update(raw, frame.time_s) if self._settings.filtered else raw
         timings = {
@@ -105,10 +115,11 @@ class LightingTracker:
         }
         if pose.camera_from_probe is None and lighting is not None:
             pose = ProbePose(None, float("nan"), "coasting")
-        return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, timings)
+        unexplained = float("nan") if estimate is None else estimate.unexplained
+        return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, timings, unexplained)
 
-    def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Lighting | None, float]:
-        """The frame's own lighting, and when its blocks had been measured."""
+    def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Estimate | None, float]:
+        """The frame's own estimate, and when its blocks had been measured."""
         if pose.camera_from_probe is None:
             return None, perf_counter()
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
@@ -119,4 +130,8 @@ class LightingTracker:
             measured = perf_counter()
             last = self._estimator.estimate(means, frame.time_s, nuisance)
         self._last = last
-        return last.lighting if last else None, measured
+        return last, measured
+
+    def _cut(self, lighting: Lighting) -> Lighting:
+        order = self._settings.order
+        return lighting if order is None else lighting.truncated(order)

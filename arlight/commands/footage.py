@@ -19,6 +19,9 @@ from arlight.video.sidecars import find_sidecar
 
 # pictures that are searched for other sheets' markers, spread over the clip
 _SEARCHED = 8
+# the probe's own sheet leaves 0.01 to 0.1 of the stripes, 0.25 when the video is compressed until they are torn; other
+# phases, patterns or glass leave 0.45 or more
+_UNEXPLAINED_LIMIT = 0.35
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,28 @@ def check_result(footage: Footage, statistics: RunStatistics) -> None:
     """
     if not statistics.tracked:
         raise _absence(footage)
+    if not shows_the_sheet(statistics):
+        raise _mismatch(footage, statistics.median_unexplained)
     if footage.reader.damage is not None:
         raise VideoError(
             f"{footage.reader.path}: {footage.reader.damage}; the frames that can be read were used: "
             "copy or convert it again for the rest"
         )
+
+
+def shows_the_sheet(statistics: RunStatistics) -> bool:
+    """Whether the probe's sheet was seen: its markers, and stripes that some light explains where any are resolved."""
+    return statistics.tracked > 0 and not statistics.median_unexplained > _UNEXPLAINED_LIMIT
+
+
+def _mismatch(footage: Footage, unexplained: float) -> ProbeError:
+    return ProbeError(
+        f"{footage.probe_path}: does not match the footage: the markers in {footage.reader.path} are the probe's, but no "
+        f"light explains the stripes between them: {100.0 * unexplained:.0f} % of a typical block's are left over, at most "
+        f"{100.0 * _UNEXPLAINED_LIMIT:.0f} % are expected; give the probe.json of the sheet that was filmed (--probe FILE), "
+        "check its glass_mm and refractive_index, that film and paper belong together and lie the right way round, and "
+        "that the video is not compressed until the stripes are torn"
+    )
 
 
 def _absence(footage: Footage) -> ArlightError:

@@ -24,8 +24,16 @@ class RelightingOptions:
     settings: tyro.conf.OmitArgPrefixes[RelightSettings] = field(default_factory=RelightSettings)
 
 
-def make_relighter(options: RelightingOptions, probe: Probe, camera: Camera) -> FrameRelighter:
+def make_relighter(
+    options: RelightingOptions, probe: Probe, camera: Camera, order: int | None = None
+) -> FrameRelighter:
     """Load the object and fold its shadows into matrices, with a progress line.
+
+    Args:
+        options: the object and how it stands on the sheet.
+        probe: the sheet.
+        camera: intrinsics of the frames to come.
+        order: highest order of the light; the sheet's by default.
 
     Raises:
         MeshError: the object cannot be used.
@@ -34,4 +42,6 @@ def make_relighter(options: RelightingOptions, probe: Probe, camera: Camera) -> 
     mesh = default_object() if options.object is None else load_mesh(options.object)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing the object", total=1.0)
-        return Relighter(mesh, probe, camera, options.settings, lambda share: progress.update(task, completed=share))
+        return Relighter(
+            mesh, probe, camera, options.settings, lambda share: progress.update(task, completed=share), order
+        )

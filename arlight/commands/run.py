@@ -6,14 +6,15 @@ from pathlib import Path
 import tyro
 
 from arlight.commands.encoding import EncodingOptions
-from arlight.commands.footage import Footage, FootageOptions, check_result, open_footage
+from arlight.commands.footage import Footage, FootageOptions, check_result, open_footage, shows_the_sheet
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.commands.loop import Sinks, Work, run_frames
 from arlight.commands.options import OptionalFile, PositionalFile
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.commands.relighting import RelightingOptions, make_relighter
 from arlight.commands.summary import print_summary
-from arlight.errors import ArlightError, OutputError
+from arlight.errors import ArlightError, OutputError, ProbeError
+from arlight.lighting_tracker import TrackerSettings
 from arlight.pipeline import Pipeline
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
@@ -42,6 +43,8 @@ class RunOptions:
     """An HTML page with the coefficients over time and the recovered light beside thumbnails."""
     render: bool = True
     """Draw the object and write the relit video; --no-render only estimates pose and lighting, without OpenGL."""
+    order: int | None = None
+    """Highest order of the light that is told and drawn with, 0 to the sheet's; the sheet's by default."""
     footage: tyro.conf.OmitArgPrefixes[FootageOptions] = field(default_factory=FootageOptions)
     relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
     encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
@@ -54,6 +57,7 @@ def run(options: RunOptions) -> int:
         ArlightError: something the user can mend, in the clip, the probe, the camera, the object or an output.
     """
     with open_footage(options.clip, options.footage) as footage:
+        _check_order(options.order, footage)
         outputs = _prepare(options, footage)
         pipeline = _pipeline(options, footage)
         statistics = RunStatistics()
@@ -61,11 +65,18 @@ def run(options: RunOptions) -> int:
             interrupted = _process(options, footage, pipeline, outputs, statistics)
             check_result(footage, statistics)
         except (ArlightError, KeyboardInterrupt):
-            abandon(outputs.values(), worth_keeping=statistics.tracked > 0)
+            abandon(outputs.values(), worth_keeping=shows_the_sheet(statistics))
             raise
     written = {option.removeprefix("--"): output.keep() for option, output in outputs.items()}
     print_summary(statistics, written, interrupted)
     return INTERRUPTED_EXIT_CODE if interrupted else 0
+
+
+def _check_order(order: int | None, footage: Footage) -> None:
+    if order is not None and not 0 <= order <= footage.probe.order:
+        raise ProbeError(
+            f"--order {order}: {footage.probe_path} measures orders 0 to {footage.probe.order}; ask for one of those"
+        )
 
 
 def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
@@ -84,15 +95,16 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
 
 
 def _pipeline(options: RunOptions, footage: Footage) -> Pipeline:
-    relighter = make_relighter(options.relighting, footage.probe, footage.camera) if options.render else None
-    return Pipeline(footage.probe, footage.camera, relighter)
+    probe, camera, order = footage.probe, footage.camera, options.order
+    relighter = make_relighter(options.relighting, probe, camera, order) if options.render else None
+    return Pipeline(probe, camera, relighter, TrackerSettings(order=order))
 
 
 def _process(
     options: RunOptions, footage: Footage, pipeline: Pipeline, outputs: dict[str, Output], statistics: RunStatistics
 ) -> bool:
     """Every frame of the clip into the outputs; returns whether it was interrupted."""
-    header = LogHeader.of(footage.probe, footage.camera, str(options.clip), str(footage.probe_path))
+    header = LogHeader.of(footage.probe, footage.camera, str(options.clip), str(footage.probe_path), options.order)
     with Sinks() as sinks:
         if "--output" in outputs:
             growing = outputs["--output"].growing

@@ -9,6 +9,7 @@ from arlight.estimation.normal_equations import BlockSystem
 from arlight.estimation.prior import COLOR_SPREAD
 from arlight.estimation.response import optical_transfer
 from arlight.estimation.row_noise import row_variance
+from arlight.estimation.sheet_match import unexplained_share
 from arlight.tracking.block_means import BlockMeans
 
 Array = NDArray[np.float64]
@@ -59,6 +60,8 @@ class ChannelFit:
     """(blocks, 7) rows that lighting and reflection predict, blur included."""
     chi2: float
     """Robust chi-square per row; nan when no row was usable."""
+    unexplained: float
+    """Share of the stripes that the fit does not explain, 0 to about 1; nan where too few blocks show clear stripes."""
     nuisance: Nuisance
     """Blur and lower face at which the stripes fit best."""
 
@@ -105,7 +108,7 @@ def fit_channel(
         residual = residual - mirror * extra[:, None]
         squared = residual**2 / variance
         # a stray mean is a lamp's, which has an unknown of its own; weights judge the harmonics
-        weights[:, 1:] = (_FREEDOM + 1.0) / (_FREEDOM + squared[:, 1:])
+        weights[:] = _block_weights(squared, usable)[:, None]
         reflection = field + extra
         nuisance = _next_nuisance(nuisance, lit, lower * transfer * reflection[:, None], residual, precision, means)
     size = len(solution) - system.field_size
@@ -116,6 +119,7 @@ def fit_channel(
         reflection=reflection,
         predicted=lit + mirror * reflection[:, None],
         chi2=float(np.mean((weights * squared)[usable])) if np.any(usable) else float("nan"),
+        unexplained=unexplained_share(means, channel, white, values - residual, transfer),
         nuisance=nuisance,
     )
 
@@ -139,6 +143,13 @@ def _next_lamps(residual: Array, precision: Array, mirror: Array, lamp: Array, o
     spread = lamp / (1.0 + lamp * seen)
     extra = spread * np.sum(precision * mirror * residual, axis=1)
     return extra, (_FREEDOM * ordinary + extra**2 + spread) / (_FREEDOM + 1.0)
+
+
+def _block_weights(squared: Array, usable: NDArray[np.bool_]) -> Array:
+    """Student-t weight (blocks,) by all harmonics of a block together: what hides a block spoils all its rows."""
+    count = np.sum(usable[:, 1:], axis=1)
+    total = np.sum(np.where(usable[:, 1:], squared[:, 1:], 0.0), axis=1)
+    return (_FREEDOM + count) / (_FREEDOM + total)
 
 
 def _usable(means: BlockMeans, transfer: Array) -> NDArray[np.bool_]:

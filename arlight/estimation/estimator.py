@@ -40,6 +40,8 @@ class Estimate:
     """(blocks, 3) mirror reflection in the film's upper face [full scale]."""
     nuisance: Nuisance
     """Blur and lower face as the stripes show them."""
+    unexplained: float
+    """Share of the stripes that no light explains on this sheet, as green shows it; nan where they are not resolved."""
 
 
 class LightingEstimator:
@@ -94,7 +96,7 @@ class LightingEstimator:
         reflection = np.stack([fit.reflection for fit in fits], axis=1)
         stripes = _guide(np.stack([fit.predicted for fit in fits], axis=2), white)
         learnt = replace(green.nuisance, color_spread=spreads)
-        return Estimate(lighting, stripes, reflection, learnt)
+        return Estimate(lighting, stripes, reflection, learnt, green.unexplained)
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""

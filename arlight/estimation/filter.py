@@ -57,7 +57,8 @@ class LightingFilter:
         if self._last is None:
             self._last = self._start(measured) if measured is not None else None
             return self._last
-        dt = max(time_s - self._last.time_s, 0.0)
+        time_s = max(time_s, self._last.time_s)
+        dt = time_s - self._last.time_s
         ceiling = self._natural_variance(self._last)
         if measured is None:
             # nothing confirms a trend while the sheet is hidden

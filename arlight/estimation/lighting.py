@@ -1,11 +1,11 @@
 """The lighting value: Fourier coefficients of the received light with their covariance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.fourier import frequency_order
+from arlight.fourier import frequency_order, orders_up_to
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,24 @@ class Lighting:
     def order(self) -> int:
         """Highest order |n| in use."""
         return int(frequency_order(self.frequencies).max())
+
+    def truncated(self, order: int) -> "Lighting":
+        """The same light with the frequencies up to an order alone; what is left keeps its error bars.
+
+        Args:
+            order: 0 or more, not beyond the lighting's own.
+
+        Raises:
+            ProbeError: the lighting does not reach the order.
+        """
+        kept = orders_up_to(self.frequencies, order)
+        packed = np.repeat(kept, 2)[1:]
+        return replace(
+            self,
+            frequencies=self.frequencies[kept],
+            coefficients=self.coefficients[kept],
+            covariance=self.covariance[:, packed][:, :, packed],
+        )
 
     @property
     def stddev(self) -> NDArray[np.float64]:

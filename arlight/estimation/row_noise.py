@@ -29,7 +29,7 @@ _COLOR_SPREAD = 0.05
 _LEAST_TRUST = 0.02
 _CHROMA_MEAN = 0.001
 """Error of a mean of red or blue that comes from subsampled, coarsely quantised chroma: an eighth of a level."""
-_CHROMA_SWING = 0.004
+_CHROMA_SWING = 0.001
 """The same of a harmonic."""
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
-from arlight.fourier import pack_real
+from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
 from arlight.rendering.composite import cover, shade_plane
 from arlight.rendering.draw import ObjectRenderer
@@ -90,6 +90,7 @@ class Relighter:
         camera: Camera,
         settings: RelightSettings | None = None,
         progress: Progress | None = None,
+        order: int | None = None,
     ) -> None:
         """Cast the object's shadows and fold them into matrices; takes seconds.
 
@@ -99,15 +100,18 @@ class Relighter:
             camera: intrinsics of the frames to come.
             settings: placement, material, sampling.
             progress: called with the share of the precomputation done, from 0 to 1.
+            order: highest order of the lightings to come, as in `TrackerSettings`; the sheet's by default.
 
         Raises:
             MeshError: the object cannot be placed.
+            ProbeError: the sheet does not measure the order.
             RenderingUnavailableError: no headless OpenGL.
         """
         self.settings = settings or RelightSettings()
         s = self.settings
         self._camera = camera
-        self._frequencies = np.asarray(probe.frequencies)
+        frequencies = np.asarray(probe.frequencies)
+        self._frequencies = frequencies if order is None else frequencies[orders_up_to(frequencies, order)]
         self.mesh = mesh.placed(s.size_mm, s.position_mm, s.yaw_deg)
         self._reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
         self.transfer = precompute_transfer(self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress)
@@ -176,8 +180,8 @@ class Relighter:
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
         if not np.array_equal(lighting.frequencies, self._frequencies):
             raise ValueError(
-                f"the lighting has {len(lighting.frequencies)} frequencies that are not the sheet's "
-                f"{len(self._frequencies)}; make the relighter with the probe that the lighting was estimated on"
+                f"the lighting has {len(lighting.frequencies)} frequencies that are not the relighter's "
+                f"{len(self._frequencies)}; make it with the probe and the order that the lighting was estimated with"
             )
         return pack_real(lighting.coefficients).astype(np.float32)
 

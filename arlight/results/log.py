@@ -188,6 +188,7 @@ def _record_json(record: LogRecord) -> dict[str, Any]:
         "coefficients_im": None if coefficients is None else _numbers(coefficients.imag),
         "stddev": None if record.stddev is None else _numbers(record.stddev),
         "chi2": _number(record.chi2),
+        "unexplained": _number(record.unexplained),
         "timings_ms": {stage: _number(ms) for stage, ms in record.timings_ms.items()},
     }
 
@@ -211,6 +212,7 @@ def _record_from(content: dict[str, Any], count: int) -> LogRecord:
         order=content["order"],
         chi2=_or_nan(content["chi2"]),
         timings_ms={stage: _or_nan(ms) for stage, ms in content["timings_ms"].items()},
+        unexplained=_or_nan(content.get("unexplained")),
     )
 
 

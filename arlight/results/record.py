@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.fourier import orders_up_to
 from arlight.lighting_tracker import FrameEstimate
 from arlight.optics import Slab
 from arlight.probe.design import Probe
@@ -30,9 +31,10 @@ class LogHeader:
     """The probe file, as it was named."""
 
     @classmethod
-    def of(cls, probe: Probe, camera: Camera, source: str, probe_path: str) -> "LogHeader":
-        """The header for footage of a probe."""
-        return cls(probe.frequencies, camera, probe.slab, probe.sheet_mm, source, probe_path)
+    def of(cls, probe: Probe, camera: Camera, source: str, probe_path: str, order: int | None = None) -> "LogHeader":
+        """The header for footage of a probe, with the light up to an order; the sheet's by default."""
+        frequencies = probe.frequencies if order is None else probe.frequencies[orders_up_to(probe.frequencies, order)]
+        return cls(frequencies, camera, probe.slab, probe.sheet_mm, source, probe_path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,8 @@ class LogRecord:
     """Residual chi-square per degree of freedom; nan where no block was seen."""
     timings_ms: dict[str, float]
     """Milliseconds per stage."""
+    unexplained: float = math.nan
+    """Share of the stripes that the probe does not explain under any light; nan where none are resolved."""
 
     @classmethod
     def of(cls, estimate: FrameEstimate, timings_s: dict[str, float]) -> "LogRecord":
@@ -75,4 +79,5 @@ class LogRecord:
             order=None if lighting is None else lighting.order,
             chi2=math.nan if lighting is None else lighting.chi2,
             timings_ms={stage: 1000.0 * seconds for stage, seconds in timings_s.items()},
+            unexplained=estimate.unexplained,
         )

@@ -19,6 +19,8 @@ class RunStatistics:
     """Milliseconds of every frame by stage."""
     chi2: list[float] = field(default_factory=list)
     """Residual chi-square of every tracked frame that has one."""
+    unexplained: list[float] = field(default_factory=list)
+    """Share of the stripes that the probe does not explain, of every tracked frame that resolves them."""
     started_s: float = field(default_factory=perf_counter)
     """Clock when the loop began [s]."""
     elapsed_s: float = 0.0
@@ -31,6 +33,8 @@ class RunStatistics:
             self.stages_ms.setdefault(stage, []).append(ms)
         if record.status == "tracked" and record.chi2 == record.chi2:
             self.chi2.append(record.chi2)
+        if record.status == "tracked" and record.unexplained == record.unexplained:
+            self.unexplained.append(record.unexplained)
         self.elapsed_s = perf_counter() - self.started_s
 
     @property
@@ -62,3 +66,8 @@ class RunStatistics:
     def median_chi2(self) -> float:
         """Median residual chi-square per degree of freedom; nan where no tracked frame has one."""
         return median(self.chi2) if self.chi2 else nan
+
+    @property
+    def median_unexplained(self) -> float:
+        """Median share of the stripes that the probe does not explain; nan where no tracked frame resolves them."""
+        return median(self.unexplained) if self.unexplained else nan

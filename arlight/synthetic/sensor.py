@@ -22,9 +22,9 @@ class Sensor:
     """Standard deviation of the lens blur, a Gaussian in linear light [px]."""
     vignetting: float = 0.0
     """Strength of the darkening toward the corners: 1 for the natural cos^4 of the angle off the axis, 0 for none."""
-    read_noise: float = 0.0007
+    read_noise: float = 0.0015
     """Standard deviation of the noise in the dark."""
-    gain: float = 2e-5
+    gain: float = 3e-5
     """Variance of the shot noise per unit of signal: 1 / electrons at full scale."""
 
     def __post_init__(self) -> None:
