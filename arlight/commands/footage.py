@@ -112,11 +112,11 @@ def shows_the_sheet(statistics: RunStatistics) -> bool:
 
 def _mismatch(footage: Footage, unexplained: float) -> ProbeError:
     return ProbeError(
-        f"{footage.probe_path}: does not match the footage: the markers in {footage.reader.path} are the probe's, but no "
-        f"light explains the stripes between them: {100.0 * unexplained:.0f} % of a typical block's are left over, at most "
-        f"{100.0 * _UNEXPLAINED_LIMIT:.0f} % are expected; give the probe.json of the sheet that was filmed (--probe FILE), "
-        "check its glass_mm and refractive_index, that film and paper belong together and lie the right way round, and "
-        "that the video is not compressed until the stripes are torn"
+        f"{footage.probe_path}: does not match the footage: {footage.reader.path} shows its markers, but stripes "
+        f"between them that no light explains ({100.0 * unexplained:.0f} % of a typical block's are left over, up to "
+        f"{100.0 * _UNEXPLAINED_LIMIT:.0f} % can be); give the probe.json of the sheet that was filmed (--probe FILE), "
+        "check its glass_mm and refractive_index and that film and paper lie as the guide has them; a video that is "
+        "compressed until its stripes are torn looks the same"
     )
 
 
