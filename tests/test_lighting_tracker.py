@@ -8,7 +8,7 @@ import pytest
 
 from arlight.camera import Camera
 from arlight.color import encoded_from_linear
-from arlight.errors import CameraError, RenderingUnavailableError
+from arlight.errors import CameraError, ProbeError, RenderingUnavailableError
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.layout import design_probe
 from arlight.synthetic.settings import SynthesisSettings, default_camera
@@ -217,3 +217,66 @@ def test_a_sheet_half_out_of_the_picture_is_measured_where_it_is_seen(film):
     assert estimate.pose.status == "tracked"
     deviation = np.abs(estimate.raw.coefficients - synthetic.truth.coefficients) / estimate.raw.stddev
     assert np.sqrt(np.mean(deviation**2)) < 2.0
+
+
+def test_a_lower_order_is_the_whole_estimate_cut_not_another_fit(film):
+    whole, low = LightingTracker(PROBE, CAMERA), LightingTracker(PROBE, CAMERA, TrackerSettings(order=1))
+    for synthetic in film()[:3]:
+        full, cut = whole.update(synthetic.frame), low.update(synthetic.frame)
+        count = len(cut.lighting.frequencies)
+        assert (full.lighting.order, cut.lighting.order, cut.raw.order) == (2, 1, 1)
+        np.testing.assert_allclose(cut.raw.coefficients, full.raw.coefficients[:count], rtol=1e-9)
+        np.testing.assert_allclose(cut.raw.stddev, full.raw.stddev[:count], rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", [-1, 3])
+def test_an_order_that_the_sheet_does_not_measure_is_refused(order):
+    with pytest.raises(ProbeError, match="the sheet measures orders 0 to 2"):
+        LightingTracker(PROBE, CAMERA, TrackerSettings(order=order))
+
+
+def with_patterns(change):
+    patterns = [block for block in PROBE.blocks if block.kind == "pattern"]
+    changed = iter(change(patterns))
+    return replace(PROBE, blocks=tuple(next(changed) if b.kind == "pattern" else b for b in PROBE.blocks))
+
+
+def other_phases(patterns):
+    return [replace(block, phase_deg=(block.phase_deg + 180.0) % 360.0) for block in patterns]
+
+
+def shuffled_phases(patterns):
+    phases = np.random.default_rng(5).permutation([block.phase_deg for block in patterns])
+    return [replace(block, phase_deg=float(phase)) for block, phase in zip(patterns, phases, strict=True)]
+
+
+def shuffled_patterns(patterns):
+    order = np.random.default_rng(5).permutation(len(patterns))
+    return [
+        replace(block, frequency=patterns[k].frequency, phase_deg=patterns[k].phase_deg)
+        for block, k in zip(patterns, order, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("environment", ["apartment", "bridge"])
+def test_the_sheet_s_own_stripes_are_explained(film, environment):
+    tracker = LightingTracker(PROBE, CAMERA)
+    for synthetic in film(environment=environment):
+        assert tracker.update(synthetic.frame).unexplained < 0.1
+    assert np.isnan(tracker.update(black(9, 1.0)).unexplained)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        with_patterns(other_phases),
+        with_patterns(shuffled_phases),
+        with_patterns(shuffled_patterns),
+        replace(PROBE, glass_mm=1.3 * PROBE.glass_mm),
+    ],
+    ids=["other phases", "shuffled phases", "shuffled patterns", "other glass"],
+)
+def test_no_light_explains_another_sheet_s_stripes(film, other):
+    tracker = LightingTracker(other, CAMERA)
+    shares = [tracker.update(synthetic.frame).unexplained for synthetic in film()]
+    assert np.nanmedian(shares) > 0.45

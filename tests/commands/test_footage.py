@@ -1,11 +1,12 @@
 """A clip with the probe and camera that belong to it."""
 
+import math
 import shutil
 
 import pytest
 
 from arlight.camera import Camera
-from arlight.commands.footage import FootageOptions, check_result, open_footage
+from arlight.commands.footage import FootageOptions, check_result, open_footage, shows_the_sheet
 from arlight.errors import CameraError, ProbeError, VideoError
 from arlight.results.record import LogRecord
 from arlight.results.statistics import RunStatistics
@@ -53,3 +54,20 @@ def test_a_run_that_saw_the_sheet_is_accepted(footage):
 def test_a_clip_without_markers_is_told_from_one_with_others(empty_table):
     with open_footage(empty_table, FootageOptions()) as found, pytest.raises(VideoError, match="no frame showed"):
         check_result(found, seen("lost"))
+
+
+@pytest.mark.parametrize(("unexplained", "matches"), [(0.03, True), (math.nan, True), (0.6, False)])
+def test_stripes_that_no_light_explains_are_refused(footage, unexplained, matches):
+    statistics = RunStatistics()
+    # one frame that is torn does not decide
+    for share in (0.9, unexplained, unexplained) if unexplained == unexplained else (unexplained,):
+        statistics.add(LogRecord(0, 0.0, "tracked", None, 0.0, None, None, None, 1.0, {}, share))
+    with open_footage(footage / "orbit.mp4", FootageOptions()) as found:
+        assert shows_the_sheet(statistics) == matches
+        if matches:
+            check_result(found, statistics)
+            return
+        with pytest.raises(
+            ProbeError, match=r"probe\.json: does not match the footage.*orbit\.mp4.*60 %.*--probe FILE"
+        ):
+            check_result(found, statistics)

@@ -231,6 +231,42 @@ def test_a_probe_with_the_markers_elsewhere_is_named(arlight, footage, tmp_path)
     assert sorted(files(tmp_path)) == ["other.json"]
 
 
+def test_a_probe_whose_markers_match_but_not_its_stripes_is_named(arlight, footage, tmp_path):
+    probe = load_probe(footage / "probe.json")
+    patterns = [block for block in probe.blocks if block.kind == "pattern"]
+    phases = iter(np.random.default_rng(1).permutation([block.phase_deg for block in patterns]).tolist())
+    blocks = tuple(replace(b, phase_deg=next(phases)) if b.kind == "pattern" else b for b in probe.blocks)
+    save_probe(replace(probe, blocks=blocks), tmp_path / "other.json")
+    (tmp_path / "old.mp4").write_text("precious")
+    done = arlight("run", footage / "orbit.mp4", "--probe", "other.json", "--output", "old.mp4", *QUICK)
+    assert done.status == 1
+    assert "other.json: does not match the footage" in done.errors
+    assert "no light explains" in done.errors
+    assert sorted(files(tmp_path)) == ["old.mp4", "other.json"]
+    assert (tmp_path / "old.mp4").read_text() == "precious"
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_an_order_can_be_asked_for(arlight, footage, order):
+    done = arlight(
+        "run", footage / "orbit.mp4", "--order", order, "--output", "relit.mp4", "--lighting", "log.jsonl",
+        "--report", "report.html", *QUICK,
+    )  # fmt: skip
+    assert done.status == 0, done.errors
+    log = read_log("log.jsonl")
+    assert len(log.header.frequencies) == {0: 1, 1: 3}[order]
+    assert {record.order for record in log.records} == {order}
+    assert {record.coefficients.shape for record in log.records} == {(len(log.header.frequencies), 3)}
+    assert len(frames_of(Path("relit.mp4"))) == FRAMES
+
+
+def test_an_order_beyond_the_sheet_s_is_refused(arlight, footage, tmp_path):
+    done = arlight("run", footage / "orbit.mp4", "--order", 2, "--no-render")
+    assert done.status == 1
+    assert re.search(r"--order 2: .*probe\.json measures orders 0 to 1", done.errors)
+    assert files(tmp_path) == {}
+
+
 def test_an_existing_output_is_replaced_when_the_run_ends(arlight, footage, tmp_path):
     (tmp_path / "relit.mp4").write_text("old")
     assert arlight("run", footage / "orbit.mp4", "--output", "relit.mp4", *QUICK).status == 0

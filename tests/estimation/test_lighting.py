@@ -3,6 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from arlight.errors import ProbeError
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import half_plane_frequencies, pack_real, unpack_real
 
@@ -57,3 +58,27 @@ def test_variances_that_rounding_made_negative_are_zero():
 def test_order_0_alone_has_an_error_bar():
     covariance = np.array([1.0, 4.0, 9.0]).reshape(3, 1, 1)
     np.testing.assert_allclose(lighting_of(0, covariance).stddev, [[1, 2, 3]])
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_cut_to_an_order_it_keeps_what_is_left(order):
+    frequencies = half_plane_frequencies(3)
+    k = len(frequencies)
+    generator = np.random.default_rng(6)
+    packed = generator.normal(size=(2 * k - 1, 3))
+    covariance = random_covariance(2 * k - 1, 7)
+    whole = Lighting(frequencies, unpack_real(packed), covariance, 0.5, 1.3)
+    cut = whole.truncated(order)
+    np.testing.assert_array_equal(cut.frequencies, half_plane_frequencies(order))
+    left = len(cut.frequencies)
+    # frequencies are sorted by |n|, so the lower orders come first
+    np.testing.assert_array_equal(pack_real(cut.coefficients), packed[: 2 * left - 1])
+    np.testing.assert_array_equal(cut.covariance, covariance[:, : 2 * left - 1, : 2 * left - 1])
+    np.testing.assert_array_equal(cut.stddev, whole.stddev[:left])
+    assert (cut.order, cut.time_s, cut.chi2) == (order, 0.5, 1.3)
+
+
+@pytest.mark.parametrize("order", [-1, 4])
+def test_an_order_beyond_its_own_is_refused(order):
+    with pytest.raises(ProbeError, match=f"order {order} was asked for: the sheet measures orders 0 to 3"):
+        lighting_of(3).truncated(order)

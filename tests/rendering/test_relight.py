@@ -1,10 +1,12 @@
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 
+from arlight.errors import ProbeError
 from arlight.rendering.default_object import default_object
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.mesh_file import from_trimesh
@@ -173,3 +175,16 @@ def test_a_flat_or_tiny_object_can_be_lit(probe, camera, pose, lighting_of, envi
     relighter = Relighter(mesh, probe, camera, QUICK)
     relit = relighter.render(frame_of(), pose, lighting_of(environment))
     assert np.all(np.isfinite(relit.linear_rgb()))
+
+
+def test_made_for_a_lower_order_it_takes_the_light_up_to_there(probe, camera, pose, lighting_of, environment):
+    relighter = Relighter(default_object(), probe, camera, QUICK, order=2)
+    whole = lighting_of(environment)
+    _, image = relighter.draw_object(pose, whole.truncated(2))
+    low = SimpleNamespace(slab=probe.slab, frequencies=whole.truncated(2).frequencies)
+    _, expected = Relighter(default_object(), low, camera, QUICK).draw_object(pose, whole.truncated(2))
+    assert np.allclose(image, expected, atol=1e-6)
+    with pytest.raises(ValueError, match="frequencies"):
+        relighter.draw_object(pose, whole)
+    with pytest.raises(ProbeError, match="orders 0 to 5"):
+        Relighter(default_object(), probe, camera, QUICK, order=6)

@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from arlight.lighting_tracker import FrameEstimate
 
 from arlight.camera import Camera, Pose
 from arlight.errors import OutputError
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import half_plane_frequencies
+from arlight.lighting_tracker import FrameEstimate
 from arlight.optics import Slab
 from arlight.results.log import LightingLogWriter, LogError, read_log
 from arlight.results.record import LogHeader, LogRecord
@@ -37,7 +37,7 @@ def estimate_of(index: int, rng: np.random.Generator) -> FrameEstimate:
         chi2=rng.uniform(0.5, 2.0),
     )
     pose = ProbePose(Pose.from_rvec(rng.normal(size=3), rng.normal(size=3) * 300), rng.uniform(0, 0.2), "tracked")
-    return FrameEstimate(index, index / 30, pose, lighting, lighting, {"track": 0.001})
+    return FrameEstimate(index, index / 30, pose, lighting, lighting, {"track": 0.001}, rng.uniform(0.0, 0.1))
 
 
 def write_log(path, header, count=3):
@@ -66,6 +66,7 @@ def test_what_is_written_is_read_back(tmp_path, header):
         np.testing.assert_allclose(found.pose.rotation, expected.pose.rotation, atol=1e-7)
         np.testing.assert_allclose(found.pose.translation, expected.pose.translation, rtol=1e-7)
         assert found.chi2 == pytest.approx(expected.chi2, rel=1e-7)
+        assert found.unexplained == pytest.approx(expected.unexplained, rel=1e-7)
         assert found.timings_ms == pytest.approx({"track": 1.0, "render": 2.0})
 
 
@@ -76,7 +77,17 @@ def test_unknown_values_are_null_never_nan(tmp_path, header):
         writer.write(LogRecord.of(lost, lost.timings_s))
     line = path.read_text().splitlines()[1]
     content = json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} in the log"))
-    for key in ("rvec", "tvec", "reprojection_rms_px", "coefficients_re", "coefficients_im", "stddev", "chi2", "order"):
+    for key in (
+        "rvec",
+        "tvec",
+        "reprojection_rms_px",
+        "coefficients_re",
+        "coefficients_im",
+        "stddev",
+        "chi2",
+        "order",
+        "unexplained",
+    ):
         assert content[key] is None, key
     assert content["status"] == "lost"
     record = read_log(path).records[0]

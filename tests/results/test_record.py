@@ -41,3 +41,8 @@ def test_the_header_holds_what_an_evaluation_needs():
     assert header.slab == probe.slab
     assert header.sheet_mm == probe.sheet_mm
     assert header.camera is camera
+
+
+def test_the_header_can_be_cut_to_an_order():
+    header = LogHeader.of(design_probe(2), default_camera((320, 240)), "clip.mp4", "probe.json", order=1)
+    np.testing.assert_array_equal(header.frequencies, half_plane_frequencies(1))
