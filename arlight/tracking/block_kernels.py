@@ -32,8 +32,14 @@ def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, pl
         sum_cos = 0.0
         sum_sin = 0.0
         sum_view = 0.0
-        for row in range(max(boxes[block, 1], 0), min(boxes[block, 3] + 1, h), stride[block]):
-            for column in range(max(boxes[block, 0], 0), min(boxes[block, 2] + 1, w), stride[block]):
+        step = stride[block]
+        for top in range(max(boxes[block, 1], 0), min(boxes[block, 3] + 1, h), step):
+            for left in range(max(boxes[block, 0], 0), min(boxes[block, 2] + 1, w), step):
+                # any pixel of the cell: evenly spaced ones would alias the stripes
+                chance = (top * 73856093) ^ (left * 19349663)
+                row, column = top + chance % step, left + (chance // step) % step
+                if row >= h or column >= w:
+                    continue
                 rx, ry = rays[row, column]
                 depth = g[2, 0] * rx + g[2, 1] * ry + g[2, 2]
                 qx = (g[0, 0] * rx + g[0, 1] * ry + g[0, 2]) / depth
@@ -247,17 +253,20 @@ def modelled_chroma(ycc, first, phases, stripes, ycc_from_rgb, encoding, expecte
 def correct_chroma(ycc, first, phases, expected, shift, swing):
     """Replace the chroma in ycc (n, 3) by the expected one plus its block's correction.
 
-    The correction's mean `shift` (b, 2) grows with the pixel's luma, because colour differences scale with the light;
-    `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
+    The correction's mean `shift` (b, 2) grows with the pixel's luma above the block's darkest, because colour
+    differences scale with the light of the stripes; `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
     """
     for block in range(first.shape[0] - 1):
         start, stop = first[block], first[block + 1]
         total = 0.0
+        dark = 1.0
         for i in range(start, stop):
-            total += max(ycc[i, 0], 0.0) + 0.02
+            dark = min(dark, max(ycc[i, 0], 0.0))
+        for i in range(start, stop):
+            total += max(ycc[i, 0], 0.0) - dark + 0.02
         mean = total / max(stop - start, 1)
         for i in range(start, stop):
-            weight = (max(ycc[i, 0], 0.0) + 0.02) / mean
+            weight = (max(ycc[i, 0], 0.0) - dark + 0.02) / mean
             c, s = np.cos(phases[i]), np.sin(phases[i])
             for k in range(2):
                 ycc[i, 1 + k] = (

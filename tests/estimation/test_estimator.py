@@ -236,13 +236,18 @@ def test_errors_are_as_large_as_stated(probe, estimator, blank, lit, random_ligh
     assert 0.3 < np.mean(chi2) < 2.0
 
 
-def test_predicted_stripes_are_those_that_were_measured(estimator, blank, lit, random_light, fresnel):
+def test_expected_stripes_are_the_measured_ones_in_one_colour(estimator, blank, lit, random_light, fresnel):
     mirrored = fresnel(blank()) * np.array([0.01, 0.02, 0.03])
     means = lit(blank(), random_light(18, COLORS["amber"]), mirrored=mirrored, blur_variance_px2=0.5)
     stripes = settled(estimator, means).stripes
     assert stripes.shape == means.values.shape
     level = means.values[:, 0].max(axis=0)
-    assert np.all(np.abs(stripes - means.values) < 0.01 * level)
+    assert np.all(np.abs(stripes[:, 0] - means.values[:, 0]) < 0.01 * level)
+    assert np.all(np.abs(stripes[..., 1] - means.values[..., 1]) < 0.01 * level[1])
+    # red and blue stripes have green's shape: all harmonics in one ratio
+    for channel in (0, 2):
+        cross = stripes[:, 1:, channel, None] * stripes[:, None, 1:, 1]
+        np.testing.assert_allclose(cross, np.swapaxes(cross, 1, 2), atol=1e-9)
 
 
 def test_the_last_frames_blur_is_a_better_start_than_none(estimator, blank, lit, random_light):

@@ -83,8 +83,10 @@ def test_where_it_starts_does_not_matter():
 
 def test_learnt_colourfulness_stays_within_reason():
     nothing = np.zeros(len(ORDERS))
-    least = color_spread(FREQUENCIES, 1.0, nothing, nothing, COLOR_SPREAD)
-    most = color_spread(FREQUENCIES, 1.0, np.full(len(ORDERS), 1e6), nothing)
+    least = COLOR_SPREAD
+    for _ in range(20):
+        least = color_spread(FREQUENCIES, 1.0, nothing, nothing, least)
+    most = color_spread(FREQUENCIES, 1.0, np.full(len(ORDERS), 1e6), nothing, COLOR_SPREAD)
     assert 0 < least < 0.1 * COLOR_SPREAD
     assert COLOR_SPREAD < most < 1.0
 
