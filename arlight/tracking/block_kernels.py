@@ -36,7 +36,7 @@ def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, pl
         for top in range(max(boxes[block, 1], 0), min(boxes[block, 3] + 1, h), step):
             for left in range(max(boxes[block, 0], 0), min(boxes[block, 2] + 1, w), step):
                 # any pixel of the cell: evenly spaced ones would alias the stripes
-                chance = (top * 73856093) ^ (left * 19349663)
+                chance = ((top * 73856093) ^ (left * 19349663)) >> 7
                 row, column = top + chance % step, left + (chance // step) % step
                 if row >= h or column >= w:
                     continue

@@ -95,4 +95,6 @@ def test_the_means_difference_is_no_colourfulness():
     first, variance = np.zeros(len(ORDERS)), np.full(len(ORDERS), 1e-4)
     moved = first.copy()
     moved[0] = 100.0
-    assert color_spread(FREQUENCIES, 1.0, moved, variance, COLOR_SPREAD) == color_spread(FREQUENCIES, 1.0, first, variance, COLOR_SPREAD)
+    assert color_spread(FREQUENCIES, 1.0, moved, variance, COLOR_SPREAD) == color_spread(
+        FREQUENCIES, 1.0, first, variance, COLOR_SPREAD
+    )
