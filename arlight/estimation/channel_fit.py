@@ -14,7 +14,7 @@ from arlight.tracking.block_means import BlockMeans
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 6
+_ITERATIONS = 4
 _FREEDOM = 4.0
 """Degrees of freedom of the Student-t distribution of the rows' errors."""
 _SPARKLE = 0.0008

@@ -1,7 +1,7 @@
 """The mirror reflection in the film, as a smooth random field over the sheet.
 
 The film mirrors the environment, and neighbouring blocks mirror neighbouring directions. The field's prior is a
-Matern-3/2 process over the sheet, written in its leading eigenvectors, so that a few numbers a channel describe it.
+Matern-3/2 process over the sheet, written in its leading eigenvectors: numbers of known variance, a few dozen a channel, describe it.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 _LENGTH_MM = 40.0
 """Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
-_KEPT_VARIANCE = 1e-3
+_KEPT_VARIANCE = 1e-2
 
 
 def reflection_basis(centers_mm: Array) -> Array:
