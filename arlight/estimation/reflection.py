@@ -1,7 +1,7 @@
 """The mirror reflection in the film, as a smooth random field over the sheet.
 
 The film mirrors the environment, and neighbouring blocks mirror neighbouring directions. The field's prior is a
-Matern-3/2 process over the sheet, written in its leading eigenvectors: numbers of known variance, a few dozen a channel, describe it.
+Matern-3/2 process over the sheet, written in its leading eigenvectors: a few dozen numbers of known variance a channel.
 """
 
 import numpy as np
