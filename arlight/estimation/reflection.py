@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 _LENGTH_MM = 40.0
 """Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
-_KEPT_VARIANCE = 1e-2
+_KEPT_VARIANCE = 3e-3
 
 
 def reflection_basis(centers_mm: Array) -> Array:

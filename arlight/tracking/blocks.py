@@ -24,6 +24,8 @@ _CLIP = 0.94
 """Linear value from which a pixel counts as clipped: codecs ring around true white."""
 _BRIGHTEST_STRIPE = 1.1
 """Radiance that no stripe reaches, relative to white: what is brighter is a lamp in the film."""
+_LAMP_OVER_AVERAGE = 1.5
+"""Radiance over its block's average from which a pixel beyond white shows a lamp."""
 _UNCLIPPED_SHARE = 0.35
 _MIN_SAMPLES = 24
 _LAMP_DEVIATION = 0.02
@@ -150,7 +152,9 @@ class BlockMeter:
         if len(white):
             # a lower quartile: some of the white blocks may mirror a lamp themselves
             level = _BRIGHTEST_STRIPE * np.quantile(white, 0.25, axis=0)
-            ceiling[~self._white] = np.minimum(level, _CLIP)
+            # an evenly bright mirror image, the sky's at grazing view, lifts its block's stripes and hides none
+            lifted = np.maximum(level, _LAMP_OVER_AVERAGE * average[~self._white])
+            ceiling[~self._white] = np.minimum(lifted, _CLIP)
         return ceiling
 
     def _reference_colors(self, count: int, frame: Frame) -> tuple[Array, Array]:
