@@ -6,9 +6,9 @@ The view, the blur and the mirror reflection are taken as known, no prior helps:
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.response import BlockResponse, optical_transfer
+from arlight.color import encoded_from_linear
+from arlight.estimation.response import BlockResponse, frequency_columns, optical_transfer
 from arlight.probe.design import Probe
-from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import BlockMeans
 
 Array = NDArray[np.float64]
@@ -20,8 +20,7 @@ class CramerRaoBound:
     def __init__(self, probe: Probe) -> None:
         self._response = BlockResponse(probe)
         self._count = 2 * len(probe.frequencies) - 1
-        index = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
-        column = np.array([index[block.frequency] if block.frequency else 0 for block in field_blocks(probe)])
+        column = frequency_columns(probe)
         self._places = np.stack([np.zeros_like(column), 2 * column - 1, 2 * column], axis=1)
         self._known = np.where(column > 0, 3, 1)
 
@@ -67,6 +66,6 @@ def sensor_variance(radiance: Array, read_noise: float, gain: float) -> Array:
     """
     signal = np.clip(radiance, 0.0, 1.0)
     # slope of the sRGB curve's inverse: how much light a level is
-    encoded = np.where(signal <= 0.0031308, 12.92 * signal, 1.055 * np.maximum(signal, 1e-9) ** (1 / 2.4) - 0.055)
+    encoded = encoded_from_linear(signal, "srgb").astype(float)
     slope = np.where(encoded <= 0.04045, 1 / 12.92, 2.4 / 1.055 * ((encoded + 0.055) / 1.055) ** 1.4)
     return read_noise**2 + gain * signal + (slope / 255.0) ** 2 / 12.0

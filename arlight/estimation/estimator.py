@@ -14,7 +14,7 @@ from arlight.estimation.lighting import Lighting
 from arlight.estimation.normal_equations import BlockSystem
 from arlight.estimation.prior import color_spread, color_stddev, prior_stddev
 from arlight.estimation.reflection import field_amplitude, reflection_basis
-from arlight.estimation.response import BlockResponse
+from arlight.estimation.response import BlockResponse, frequency_columns
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import unpack_real
 from arlight.probe.design import Probe
@@ -51,7 +51,6 @@ class LightingEstimator:
         """Prepare for a sheet; `bounces` as in `BlockResponse`."""
         blocks = field_blocks(probe)
         kinds = np.array([block.kind for block in blocks])
-        index = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
         self._frequencies = probe.frequencies
         self._slab = probe.slab
         self._response = BlockResponse(probe, bounces=bounces)
@@ -60,7 +59,7 @@ class LightingEstimator:
         self._black_film = np.isin(kinds, ["black_white", "black_black"])
         self._clear_black = kinds == "clear_black"
         self._mean_model = np.where(self._white, WHITE_MODEL, MEAN_MODEL)
-        self._column = np.array([index[block.frequency] if block.frequency else 0 for block in blocks])
+        self._column = frequency_columns(probe)
         self._basis = reflection_basis(np.array([block.center_mm for block in blocks], float).reshape(-1, 2))
         self._white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
 
@@ -75,13 +74,13 @@ class LightingEstimator:
         Returns:
             The estimate. Blocks that were not seen add nothing; with none at all the covariance is the prior's.
         """
+        start = nuisance or Nuisance()
         rows = self._response.light(means)
         white = self._white_level(means)
         lower = self._response.lower_mirror(means)
-        green = self._fit(means, rows, lower, _GREEN, white, nuisance or Nuisance(), None)
+        green = self._fit(means, rows, lower, _GREEN, white, start, None)
         red, blue = (self._fit(means, rows, lower, channel, white, green.nuisance, green) for channel in (0, 2))
         fits = (red, green, blue)
-        start = nuisance or Nuisance()
         spreads = (
             self._color_spread(red, green, start.color_spread[0]),
             self._color_spread(blue, green, start.color_spread[1]),

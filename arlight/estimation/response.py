@@ -51,6 +51,12 @@ class BlockResponse:
         return _real_rows(series[..., None])[..., 0] * passed[:, None]
 
 
+def frequency_columns(probe: Probe) -> NDArray[np.int64]:
+    """(blocks,) place of each block's frequency among the probe's frequencies; 0 for blocks without pattern."""
+    place = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
+    return np.array([place[block.frequency] if block.frequency else 0 for block in field_blocks(probe)])
+
+
 def view_powers(phasor: ComplexArray, step: int) -> ComplexArray:
     """Means of exp(-i step l b) for l = -H..H, from the mean phasor of b over a block.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.color import linear_from_encoded
 from arlight.probe.design import Probe
 from arlight.tracking import block_kernels as kernels
 from arlight.tracking.block_color import chroma_correction, color_line
@@ -161,9 +162,7 @@ class BlockMeter:
         """Linear RGB of a black and of a white region, medians over the sheet."""
         average = np.empty((len(self._patterned), 3))
         kernels.block_average(self._encoded[:count], self._first, average)
-        table = decoding_table(frame.format.transfer)[:-1]
-        encoded = np.clip(average @ frame.format.rgb_from_ycc().astype(float).T, 0.0, 1.0)
-        linear = np.interp(encoded, np.linspace(0.0, 1.0, len(table)), table)
+        linear = linear_from_encoded(average @ frame.format.rgb_from_ycc().T, frame.format.transfer).astype(float)
         seen = np.diff(self._first) >= _MIN_SAMPLES
         black, white = linear[self._black & seen], linear[self._white & seen & (linear.max(axis=1) < _CLIP)]
         dark = np.median(black, axis=0) if len(black) else np.zeros(3)
@@ -224,6 +223,7 @@ class _Fit:
 
     @classmethod
     def empty(cls, blocks: int, channels: int) -> "_Fit":
+        """Buffers of zeros."""
         return cls(
             np.zeros((blocks, ROWS, channels)),
             np.zeros((blocks, ROWS, ROWS)),
