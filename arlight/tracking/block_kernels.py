@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+ROWS = 7
+"""What is kept of a block's fit: the mean, and cosine and sine of three harmonics."""
 MAX_COLUMNS = 16
 """Columns of a block's fit at most: ten monomials of x and y up to degree 3, and the harmonics."""
 
