@@ -1,0 +1,1 @@
+"""Path-traced sheets: light transport that none of our formulas produced."""
