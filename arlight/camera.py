@@ -1,4 +1,4 @@
-"""The pinhole camera with lens distortion, and rigid poses.
+"""The pinhole camera with lens distortion and vignetting, and rigid poses.
 
 Pixel centres lie at integers; distortion is in OpenCV's order; `camera_from_probe` maps probe millimetres to camera
 millimetres (x right, y down, z forward).
@@ -29,15 +29,20 @@ class Camera:
     """(3, 3) intrinsic matrix without skew [px]."""
     distortion: Array
     """(n,) lens distortion in OpenCV's order; zeros for none."""
+    vignetting: tuple[float, float, float] | None = None
+    """(k1, k2, k3) of the radial gain 1 + k1 r^2 + k2 r^4 + k3 r^6, r the distance from the principal point in half
+    diagonals of the picture; None for an even gain."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "camera_matrix", np.asarray(self.camera_matrix, float))
         object.__setattr__(self, "distortion", np.asarray(self.distortion, float).reshape(-1))
         _check_intrinsics(self.image_size, self.camera_matrix, self.distortion)
+        if self.vignetting is not None:
+            object.__setattr__(self, "vignetting", _checked_vignetting(self))
 
     @classmethod
     def load(cls, path: Path | str) -> "Camera":
-        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion.
+        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion and, where known, vignetting.
 
         Raises:
             CameraError: the file is missing, is not JSON, or holds impossible values.
@@ -46,7 +51,12 @@ class Camera:
         try:
             content: dict[str, Any] = json.loads(path.read_text())
             width, height = content["image_size"]
-            return cls((int(width), int(height)), content["camera_matrix"], content.get("distortion", [0.0] * 5))
+            return cls(
+                (int(width), int(height)),
+                content["camera_matrix"],
+                content.get("distortion", [0.0] * 5),
+                content.get("vignetting"),
+            )
         except OSError as error:
             raise CameraError(f"{path}: cannot be read ({error.strerror}); a camera.json is expected there") from error
         except CameraError as error:
@@ -58,11 +68,13 @@ class Camera:
 
     def save(self, path: Path | str) -> None:
         """Write camera.json."""
-        content = {
+        content: dict[str, Any] = {
             "image_size": list(self.image_size),
             "camera_matrix": self.camera_matrix.tolist(),
             "distortion": self.distortion.tolist(),
         }
+        if self.vignetting is not None:
+            content["vignetting"] = list(self.vignetting)
         Path(path).write_text(json.dumps(content, indent=1) + "\n")
 
     def project(self, camera_from_probe: "Pose", points_mm: ArrayLike) -> Array:
@@ -85,6 +97,16 @@ class Camera:
             flat, self.camera_matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria
         )
         return np.asarray(undistorted, float).reshape(-1, 2)
+
+    def gain(self, pixels: ArrayLike) -> Array:
+        """Vignetting (n,) at pixels (n, 2): recorded over incident light, 1 at the principal point."""
+        flat = np.asarray(pixels, float).reshape(-1, 2)
+        if self.vignetting is None:
+            return np.ones(len(flat))
+        half_diagonal_px = 0.5 * np.hypot(*self.image_size)
+        squared = np.sum((flat - self.camera_matrix[:2, 2]) ** 2, axis=-1) / half_diagonal_px**2
+        k1, k2, k3 = self.vignetting
+        return 1.0 + squared * (k1 + squared * (k2 + squared * k3))
 
     @cached_property
     def ray_map(self) -> NDArray[np.float32]:
@@ -145,3 +167,19 @@ def _check_intrinsics(image_size: tuple[int, int], matrix: Array, distortion: Ar
         )
     if distortion.size not in (0, 4, 5, 8, 12, 14) or not np.all(np.isfinite(distortion)):
         raise CameraError(f"distortion must hold 4, 5, 8, 12 or 14 finite numbers, found {distortion.size}")
+
+
+def _checked_vignetting(camera: Camera) -> tuple[float, float, float]:
+    values = np.asarray(camera.vignetting, float)
+    if values.shape != (3,) or not np.all(np.isfinite(values)):
+        raise CameraError(f"vignetting must hold 3 finite numbers (k1, k2, k3), found {camera.vignetting}")
+    k1, k2, k3 = (float(v) for v in values)
+    width, height = camera.image_size
+    x, y = np.meshgrid(np.linspace(0.0, width - 1.0, 33), np.linspace(0.0, height - 1.0, 33))
+    least = float(camera.gain(np.stack([x, y], axis=-1)).min())
+    if least <= 0.05:
+        raise CameraError(
+            f"vignetting must leave a positive gain all over the picture, found {least:.3g} at its least; "
+            "r is counted in half diagonals of the picture"
+        )
+    return k1, k2, k3

@@ -143,3 +143,32 @@ def test_view_directions_lead_to_the_camera():
     distance = np.linalg.norm(POSE.transform(points), axis=-1)
     expected = np.broadcast_to(POSE.camera_centre_mm, points.shape)
     np.testing.assert_allclose(points + distance[..., None] * toward, expected, atol=1e-9)
+
+
+def test_gain_falls_off_from_the_principal_point_in_half_diagonals():
+    matrix = np.array([[500.0, 0, 300.0], [0, 500.0, 200.0], [0, 0, 1]])
+    camera = Camera((600, 800), matrix, np.zeros(5), (-0.3, 0.1, -0.02))
+    # half of the diagonal of 600 x 800 is 500: these lie 0, 1/2 and 1 of it away
+    found = camera.gain([[300, 200], [300, 450], [600, 600]])
+    np.testing.assert_allclose(found, [1.0, 1 - 0.3 / 4 + 0.1 / 16 - 0.02 / 64, 1 - 0.3 + 0.1 - 0.02], rtol=1e-12)
+
+
+def test_a_camera_without_vignetting_has_an_even_gain():
+    np.testing.assert_array_equal(camera_of(BROWN).gain([[0, 0], [639, 479]]), [1.0, 1.0])
+
+
+def test_vignetting_is_saved_where_there_is_some(tmp_path):
+    Camera((640, 480), MATRIX, BROWN, (-0.3, 0.1, -0.02)).save(tmp_path / "camera.json")
+    assert Camera.load(tmp_path / "camera.json").vignetting == (-0.3, 0.1, -0.02)
+    camera_of(BROWN).save(tmp_path / "plain.json")
+    assert "vignetting" not in json.loads((tmp_path / "plain.json").read_text())
+    assert Camera.load(tmp_path / "plain.json").vignetting is None
+
+
+@pytest.mark.parametrize("vignetting", [(0.1, 0.2), (np.nan, 0, 0), (-2.0, 0, 0), "none", (1, 2, 3, 4)], ids=str)
+def test_impossible_vignetting_is_refused(tmp_path, vignetting):
+    path = tmp_path / "camera.json"
+    content = {"image_size": [640, 480], "camera_matrix": MATRIX.tolist(), "vignetting": vignetting}
+    path.write_text(json.dumps(content))
+    with pytest.raises(CameraError, match=r"camera\.json"):
+        Camera.load(path)
