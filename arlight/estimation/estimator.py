@@ -14,9 +14,11 @@ from arlight.estimation.lighting import Lighting
 from arlight.estimation.normal_equations import BlockSystem
 from arlight.estimation.prior import color_spread, color_stddev, prior_stddev
 from arlight.estimation.reflection import field_amplitude, reflection_basis
-from arlight.estimation.response import BlockResponse, frequency_columns
+from arlight.estimation.resampling import resampling
+from arlight.estimation.response import BlockResponse
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import unpack_real
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import BlockMeans
@@ -47,19 +49,20 @@ class Estimate:
 class LightingEstimator:
     """Estimates lighting from a sheet's block measurements; what the view does not change is prepared once."""
 
-    def __init__(self, probe: Probe, *, bounces: bool = True) -> None:
-        """Prepare for a sheet; `bounces` as in `BlockResponse`."""
+    def __init__(self, probe: Probe, assembly: Assembly | None = None, *, bounces: bool = True) -> None:
+        """Prepare for a sheet; `assembly` and `bounces` as in `BlockResponse`."""
+        assembly = assembly or Assembly()
         blocks = field_blocks(probe)
         kinds = np.array([block.kind for block in blocks])
         self._frequencies = probe.frequencies
-        self._slab = probe.slab
-        self._response = BlockResponse(probe, bounces=bounces)
+        self._slab = assembly.slab(probe)
+        self._response = BlockResponse(probe, assembly, bounces=bounces)
+        self._resampling = resampling(probe, assembly)
         self._patterned = kinds == "pattern"
         self._white = kinds == "clear_white"
         self._black_film = np.isin(kinds, ["black_white", "black_black"])
         self._clear_black = kinds == "clear_black"
         self._mean_model = np.where(self._white, WHITE_MODEL, MEAN_MODEL)
-        self._column = frequency_columns(probe)
         self._basis = reflection_basis(np.array([block.center_mm for block in blocks], float).reshape(-1, 2))
         self._white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
 
@@ -85,17 +88,23 @@ class LightingEstimator:
             self._color_spread(red, green, start.color_spread[0]),
             self._color_spread(blue, green, start.color_spread[1]),
         )
-        lighting = Lighting(
-            self._frequencies,
-            unpack_real(np.stack([fit.packed for fit in fits], axis=1)),
-            np.stack([fit.covariance for fit in fits]),
-            time_s,
-            float(np.mean([fit.chi2 for fit in fits])),
-        )
+        lighting = self._lighting(fits, time_s)
         reflection = np.stack([fit.reflection for fit in fits], axis=1)
         stripes = _guide(np.stack([fit.predicted for fit in fits], axis=2), white)
         learnt = replace(green.nuisance, color_spread=spreads)
         return Estimate(lighting, stripes, reflection, learnt, green.unexplained)
+
+    def _lighting(self, fits: tuple[ChannelFit, ...], time_s: float) -> Lighting:
+        solved = [(fit.packed, fit.covariance) for fit in fits]
+        if self._resampling is not None:
+            solved = [self._resampling.apply(*channel) for channel in solved]
+        return Lighting(
+            self._frequencies,
+            unpack_real(np.stack([packed for packed, _ in solved], axis=1)),
+            np.stack([covariance for _, covariance in solved]),
+            time_s,
+            float(np.mean([fit.chi2 for fit in fits])),
+        )
 
     def _white_level(self, means: BlockMeans) -> Array:
         """(3,) radiance of clear film on white paper; from the patterned blocks where no white is seen."""
@@ -128,8 +137,7 @@ class LightingEstimator:
             colorful = color_stddev(self._frequencies, irradiance, nuisance.color_spread[channel // 2])
             spread = np.hypot(colorful, share * np.sqrt(np.diagonal(green.covariance)))
         system = BlockSystem(
-            self._column,
-            self._patterned,
+            self._response.places,
             basis,
             np.concatenate([expected, np.zeros_like(deviation)]),
             np.concatenate([spread, deviation]),

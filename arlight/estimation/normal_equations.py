@@ -1,7 +1,7 @@
 """Weighted normal equations of blocks that share L_0 and a reflection field but have a frequency of their own.
 
-Row r of block i reads  d_r0 L_0 + d_r1 Re L_n(i) + d_r2 Im L_n(i) + mirror_r * (basis_i . w): of the unknown
-(L_0, Re L_1, ..., w) it touches three coefficients and the field, so nothing of full width is ever multiplied.
+Row r of block i reads  d_r0 L_0 + d_r1 Re L_n(i) + d_r2 Im L_n(i) + ... + mirror_r * (basis_i . w): of the unknown
+(L_0, Re L_1, ..., w) it touches three or five coefficients and the field, so nothing of full width is ever multiplied.
 """
 
 import numpy as np
@@ -13,14 +13,11 @@ Array = NDArray[np.float64]
 class BlockSystem:
     """Gathers and solves the equations of one channel."""
 
-    def __init__(
-        self, column: NDArray[np.int64], patterned: NDArray[np.bool_], basis: Array, expected: Array, deviation: Array
-    ) -> None:
+    def __init__(self, places: NDArray[np.int64], basis: Array, expected: Array, deviation: Array) -> None:
         """Fix what does not change while weights are iterated.
 
         Args:
-            column: (blocks,) index of the block's frequency in the list of coefficients.
-            patterned: (blocks,) False for blocks that only see L_0.
+            places: (blocks, c) real-packed place of each column of a block's rows; 0 where its column is 0.
             basis: (blocks, s) of the reflection field.
             expected: (c + s,) prior mean of all unknown; deviation: (c + s,) its standard deviation.
         """
@@ -29,29 +26,29 @@ class BlockSystem:
         self._expected = expected
         self._coefficients = len(deviation) - basis.shape[1]
         self.field_size = basis.shape[1]
-        real = np.where(patterned, 2 * column - 1, 0)
-        self._places = np.stack([np.zeros_like(column), real, np.where(patterned, real + 1, 0)], axis=1)
+        self._places = places
 
     def solve(self, design: Array, mirror: Array, values: Array, precision: Array) -> tuple[Array, Array]:
         """Solution (c + s,) and normal matrix (c + s, c + s) including the prior.
 
         Args:
-            design: (blocks, rows, 3); mirror, values: (blocks, rows); precision: (blocks, rows, rows).
+            design: (blocks, rows, c); mirror, values: (blocks, rows); precision: (blocks, rows, rows).
         """
         c, places, basis = self._coefficients, self._places, self._basis
         # one right-hand product a block: rows of the coefficients, of the field and of the values
+        n = places.shape[1]
         wide = np.concatenate([design, mirror[..., None], values[..., None]], axis=2)
         products = np.swapaxes(wide, 1, 2) @ (precision @ wide)
         normal = np.zeros((len(self._prior), len(self._prior)))
-        np.add.at(normal, (places[:, :, None], places[:, None, :]), products[:, :3, :3])
+        np.add.at(normal, (places[:, :, None], places[:, None, :]), products[:, :n, :n])
         cross = np.zeros((c, basis.shape[1]))
-        np.add.at(cross, places.ravel(), (products[:, :3, 3:4] * basis[:, None, :]).reshape(-1, basis.shape[1]))
+        np.add.at(cross, places.ravel(), (products[:, :n, n : n + 1] * basis[:, None, :]).reshape(-1, basis.shape[1]))
         normal[:c, c:] = cross
         normal[c:, :c] = cross.T
-        normal[c:, c:] = (basis * products[:, 3, 3][:, None]).T @ basis
+        normal[c:, c:] = (basis * products[:, n, n][:, None]).T @ basis
         right = np.zeros(len(self._prior))
-        np.add.at(right, places, products[:, :3, 4])
-        right[c:] = products[:, 3, 4] @ basis
+        np.add.at(right, places, products[:, :n, n + 1])
+        right[c:] = products[:, n, n + 1] @ basis
         normal[np.diag_indices_from(normal)] += self._prior
         right += self._prior * self._expected
         return np.asarray(np.linalg.solve(normal, right), float), normal

@@ -8,9 +8,10 @@ a + l = m (paper, eqs 12-19, with real layers). Rows are real: mean, cosine 1, s
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.stack import HARMONICS as STACK_HARMONICS
+from arlight.estimation.layer_series import HARMONICS as STACK_HARMONICS
 from arlight.estimation.stack import paper_light
-from arlight.probe.design import Probe
+from arlight.probe.assembly import Assembly
+from arlight.probe.design import Block, Probe
 from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 
@@ -21,24 +22,34 @@ ComplexArray = NDArray[np.complex128]
 class BlockResponse:
     """The response of a sheet's blocks; everything that does not depend on the view is computed once."""
 
-    def __init__(self, probe: Probe, *, bounces: bool = True) -> None:
+    places: NDArray[np.int64]
+    """(blocks, c) which real-packed coefficients the columns of a block's rows belong to."""
+
+    def __init__(self, probe: Probe, assembly: Assembly | None = None, *, bounces: bool = True) -> None:
         """Solve the stack of every block.
 
         Args:
             probe: the sheet.
+            assembly: how it was printed and put together; exactly as designed by default.
             bounces: follow the light reflected between paper and glass.
         """
         blocks = field_blocks(probe)
-        light = paper_light(probe, blocks, bounces=bounces)
-        self._slab = probe.slab
-        # (blocks, m, l, 3): film harmonic m - l times radiosity harmonic l
+        light = paper_light(probe, blocks, assembly, bounces=bounces)
+        self._slab = (assembly or Assembly()).slab(probe)
+        # (blocks, m, l, c): film harmonic m - l times radiosity harmonic l
         self._paths = _toeplitz(light.film)[..., None] * light.radiosity[:, None]
+        self.places, known = _places(probe, blocks, self._paths.shape[3])
+        self._paths *= known[:, None, None, :]
         # the lower face mirrors through the film twice, 2 D(v) apart: film harmonics m - l and l, turned by 2 l b
         self._mirror = _toeplitz(light.film) * light.film[:, None]
         self._clear = float(probe.film_transmittance)
 
     def light(self, means: BlockMeans) -> Array:
-        """Rows (blocks, 7, 3) for unit L_0, Re L_n and Im L_n of each block's own frequency, before blur."""
+        """Rows (blocks, 7, c) for unit coefficients before blur.
+
+        Columns are L_0, Re L_n and Im L_n of each block's own frequency n, then Re L_2n and Im L_2n where the film has
+        a second harmonic; `places` has where they belong.
+        """
         turn = view_powers(means.view_phasor, 1)
         series = np.einsum("bmlk,bl->bmk", self._paths, turn)
         return _real_rows(series) * (self._slab.transmittance(means.view_cosine) / np.pi)[:, None, None]
@@ -55,6 +66,22 @@ def frequency_columns(probe: Probe) -> NDArray[np.int64]:
     """(blocks,) place of each block's frequency among the probe's frequencies; 0 for blocks without pattern."""
     place = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
     return np.array([place[block.frequency] if block.frequency else 0 for block in field_blocks(probe)])
+
+
+def _places(probe: Probe, blocks: tuple[Block, ...], columns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Real-packed places (blocks, c) of the columns, and which of them the sheet's order has."""
+    place = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
+    places = np.zeros((len(blocks), columns), np.int64)
+    known = np.zeros((len(blocks), columns), bool)
+    known[:, 0] = True
+    for i, block in enumerate(blocks):
+        u, v = block.frequency or (0, 0)
+        for j in range(1, (columns + 1) // 2):
+            k = place.get((j * u, j * v), 0)
+            if k:
+                places[i, 2 * j - 1 : 2 * j + 1] = 2 * k - 1, 2 * k
+                known[i, 2 * j - 1 : 2 * j + 1] = True
+    return places, known
 
 
 def view_powers(phasor: ComplexArray, step: int) -> ComplexArray:

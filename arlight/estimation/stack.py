@@ -1,10 +1,10 @@
 """What film, glass and paper make of the light: the paper's brightness as a linear function of the coefficients.
 
-Along a block's frequency n everything repeats, so every quantity is a short Fourier series in the phase
-psi = 2 pi n.p/P of the paper point p. Light enters through the film (paper, eqs 3-4), is scattered by the paper, and a
-part of it comes back: from the lower face of the glass at once, from the upper face after two more passes through the
-film, 2 D(w) to the side. Both returns are linear, hence one small linear system a block, solved once. It does not
-depend on the view.
+Along a block's frequency n everything repeats, so every quantity is a short Fourier series in the phase psi of the
+film's pattern above the paper point. Light enters through the film (paper, eqs 3-4), is scattered by the paper, and a part of
+it comes back: from the lower face of the glass at once, from the upper face after two more passes through the film,
+2 D(w) to the side. Both returns are linear, hence one small linear system a block, solved once. It does not depend on
+the view.
 """
 
 from dataclasses import dataclass
@@ -13,106 +13,129 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import j0
 
+from arlight.estimation.layer_series import (
+    HARMONICS,
+    film_series,
+    paper_series,
+    turned,
+)
 from arlight.optics import Slab
-from arlight.probe.design import Block, Design, Probe
+from arlight.probe.assembly import Assembly, BlockCorrections
+from arlight.probe.design import Block, Probe
+from arlight.tracking.block_layout import design_cycles_per_mm
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-HARMONICS = 4
-"""Highest harmonic of psi that is followed; what is beyond it changes the ones below by less than 1e-4."""
-
 _QUADRATURE_NODES = 96
+_NO_OVERTONE = 1e-6
+"""Second harmonic of the film below which its response to L_2n is left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaperLight:
-    """Radiosity of the paper under unit coefficients, for every block."""
+    """Radiosity of the paper under unit coefficients, for every block.
+
+    Columns are L_0, Re L_n and Im L_n; a film whose print has a second harmonic also sees Re L_2n and Im L_2n.
+    """
 
     radiosity: ComplexArray
-    """(blocks, 2 H + 1, 3): harmonics -H..H of the paper's radiosity for unit L_0, Re L_n and Im L_n."""
+    """(blocks, 2 H + 1, 3 or 5): harmonics -H..H of the paper's radiosity for unit coefficients."""
     film: ComplexArray
     """(blocks, 2 H + 1): harmonics -H..H of the film's transmittance."""
 
 
-def paper_light(probe: Probe, blocks: tuple[Block, ...], *, bounces: bool = True) -> PaperLight:
+def paper_light(
+    probe: Probe, blocks: tuple[Block, ...], assembly: Assembly | None = None, *, bounces: bool = True
+) -> PaperLight:
     """Solve for the paper's radiosity in the middle of each block.
 
     Args:
-        probe: gives the slab and the two layers' reflectance and transmittance.
+        probe: gives the design, the glass and the two unprinted layers' reflectance and transmittance.
         blocks: the blocks of the field, patterned or not.
+        assembly: how the sheet was printed and put together; exactly as designed by default.
         bounces: follow the light reflected between paper and glass; without it, single scattering as in the paper.
 
     Returns:
         Harmonics in the phase of the film's pattern at the paper point; for blocks without pattern only harmonic 0
-        is not zero, and Re L_n and Im L_n have no effect.
+        is not zero, and only L_0 has an effect.
     """
-    size = 2 * HARMONICS + 1
-    radiosity = np.zeros((len(blocks), size, 3), complex)
-    film = np.zeros((len(blocks), size), complex)
-    for i, block in enumerate(blocks):
-        film[i] = probe.film_transmittance * film_harmonics(block, probe.design)
-        paper = probe.paper_reflectance * paper_harmonics(block, probe.design)
-        radiosity[i] = _radiosity(film[i], paper, block, probe.slab, bounces)
-    return PaperLight(radiosity, film)
+    assembly = assembly or Assembly()
+    cycles = design_cycles_per_mm(blocks, probe.slab.period_mm)
+    film_cycles = assembly.film.registration.cycles_per_mm(cycles)
+    paper_cycles = assembly.paper.registration.cycles_per_mm(cycles)
+    film = probe.film_transmittance * film_series(blocks, probe.design, assembly.film, film_cycles)
+    paper = probe.paper_reflectance * paper_series(blocks, probe.design, assembly.paper, paper_cycles)
+    paper *= _beat(paper_cycles - film_cycles, blocks)
+    paper = turned(paper, _paper_lead(assembly, blocks, film_cycles, paper_cycles))
+    if assembly.blocks is not None:
+        paper = _corrected(paper, assembly.blocks, probe.paper_reflectance)
+    slab = assembly.slab(probe)
+    return PaperLight(_radiosity(film, paper, np.hypot(*film_cycles.T) * slab.period_mm, slab, bounces), film)
 
 
-def film_harmonics(block: Block, design: Design) -> ComplexArray:
-    """Fourier series -H..H of the film's transmittance relative to clear film, in its own phase."""
-    match block.kind, design:
-        case "pattern", "matched":
-            return _series({0: 0.5, 1: 0.25})
-        case "pattern", "doubled":
-            return _series({0: 0.5, 1: 0.25j})
-        case (("clear_white" | "clear_black"), _):
-            return _series({0: 1.0})
-        case _:
-            return _series({})
+def _paper_lead(assembly: Assembly, blocks: tuple[Block, ...], film_cycles: Array, paper_cycles: Array) -> Array:
+    """(blocks,) how far misregistration puts the paper's pattern ahead of the film's, in the block's middle [rad]."""
+    centers = np.array([block.center_mm for block in blocks], float).reshape(-1, 2)
+    paper = np.sum(paper_cycles * (centers - assembly.paper.registration.shift_mm), axis=1)
+    film = np.sum(film_cycles * (centers - assembly.film.registration.shift_mm), axis=1)
+    return 2.0 * np.pi * (paper - film)
 
 
-def paper_harmonics(block: Block, design: Design) -> ComplexArray:
-    """Fourier series -H..H of the paper's reflectance relative to white paper, in the film's phase above it."""
-    phase = np.exp(1j * np.deg2rad(block.phase_deg or 0.0))
-    match block.kind, design:
-        case "pattern", "matched":
-            return _series({0: 0.5, 1: 0.25 * phase})
-        case "pattern", "doubled":
-            return _series({0: 0.5, 2: -0.25j * phase})
-        case (("clear_white" | "black_white"), _):
-            return _series({0: 1.0})
-        case _:
-            return _series({})
+def _beat(difference_per_mm: Array, blocks: tuple[Block, ...]) -> Array:
+    """(blocks, 2 H + 1) what is left of each harmonic over a block whose layers' stripes drift apart."""
+    window = np.array([block.window_mm for block in blocks])
+    drift = difference_per_mm[:, None, :] * np.arange(-HARMONICS, HARMONICS + 1)[:, None] * window[:, None, None]
+    return np.asarray(np.prod(np.sinc(drift), axis=-1), float)
 
 
-def _radiosity(film: ComplexArray, paper: ComplexArray, block: Block, slab: Slab, bounces: bool) -> ComplexArray:
-    """Solve (1 - g K) B = g E for the three unit lightings; columns L_0, Re L_n, Im L_n."""
-    # E(psi) = sum_j f_j conj(L_jn) exp(i j psi), and conj(L_n) = Re - i Im
-    centre = HARMONICS
-    entering = np.zeros((len(film), 3), complex)
-    entering[centre, 0] = film[centre]
-    entering[centre + 1, 1:] = film[centre + 1] * np.array([1.0, -1j])
-    entering[centre - 1, 1:] = film[centre - 1] * np.array([1.0, 1j])
-    reflect = _convolution(paper)
+def _corrected(paper: ComplexArray, blocks: BlockCorrections, reflectance: float) -> ComplexArray:
+    stripes = turned(paper * blocks.modulation[:, None], np.deg2rad(blocks.phase_deg))
+    stripes[:, HARMONICS] = paper[:, HARMONICS] + reflectance * blocks.offset
+    return np.asarray(stripes * blocks.gain[:, None], complex)
+
+
+def _radiosity(film: ComplexArray, paper: ComplexArray, frequency: Array, slab: Slab, bounces: bool) -> ComplexArray:
+    """Solve (1 - g K) B = g E for unit coefficients."""
+    entering = _entering(film)
+    reflect = convolution(paper)
     if not bounces:
         return np.asarray(reflect @ entering, complex)
-    returned = _returned_light(film, float(np.hypot(*(block.frequency or (0, 0)))), slab)
-    return np.asarray(np.linalg.solve(np.eye(len(film)) - reflect @ returned, reflect @ entering), complex)
+    returned = _returned_light(film, frequency, slab)
+    return np.asarray(np.linalg.solve(np.eye(film.shape[1]) - reflect @ returned, reflect @ entering), complex)
 
 
-def _returned_light(film: ComplexArray, frequency: float, slab: Slab) -> ComplexArray:
+def _entering(film: ComplexArray) -> ComplexArray:
+    """Irradiance through the film E(psi) = sum_j f_j conj(L_jn) exp(i j psi), and conj(L_n) = Re - i Im."""
+    overtone = int(np.max(np.abs(film[:, HARMONICS + 2]), initial=0.0) > _NO_OVERTONE)
+    entering = np.zeros((*film.shape, 3 + 2 * overtone), complex)
+    entering[:, HARMONICS, 0] = film[:, HARMONICS]
+    for j in range(1, 2 + overtone):
+        for sign in (1, -1):
+            place = HARMONICS + sign * j
+            entering[:, place, 2 * j - 1 : 2 * j + 1] = film[:, place, None] * np.array([1.0, -1j * sign])
+    return entering
+
+
+def _returned_light(film: ComplexArray, frequency: Array, slab: Slab) -> ComplexArray:
     """Irradiance on the paper, harmonic by harmonic, from the paper's own radiosity.
 
     A ray that returns to p left the paper at p - 2 D and crossed the film, twice, at p - D. With radiosity harmonic k
     and harmonic a of the squared film the phases add up to (k + a) psi - (2 k + a) 2 pi n.Delta, averaged over all D.
     """
     harmonics = np.arange(-HARMONICS, HARMONICS + 1)
-    squared = np.convolve(film, film)[HARMONICS : 3 * HARMONICS + 1]
+    squared = np.einsum("bml,bl->bm", convolution(film), film)
     k, total = np.meshgrid(harmonics, harmonics, indexing="xy")
     a = total - k
     within = np.abs(a) <= HARMONICS
-    film_part = np.where(within, squared[np.clip(a + HARMONICS, 0, 2 * HARMONICS)], 0.0)
-    upper = film_part * upper_face_return(slab, frequency * np.abs(2 * k + a))
-    return np.asarray(upper + lower_face_return(slab) * np.eye(len(harmonics)), complex)
+    film_part = np.where(within, squared[:, np.clip(a + HARMONICS, 0, 2 * HARMONICS)], 0.0)
+    # blocks share few lengths of n, and 2 k + a is a small integer
+    lengths, place = np.unique(np.round(frequency, 9), return_inverse=True)
+    multiples = np.abs(2 * k + a)
+    upper = upper_face_return(slab, np.multiply.outer(lengths, np.arange(multiples.max() + 1)))
+    return np.asarray(
+        film_part * upper[place][:, multiples] + lower_face_return(slab) * np.eye(len(harmonics)), complex
+    )
 
 
 def lower_face_return(slab: Slab) -> float:
@@ -138,24 +161,15 @@ def upper_face_return(slab: Slab, frequency: ArrayLike) -> Array:
     return kernel @ (weight * face * (1.0 - face) ** 2)
 
 
+def convolution(series: ComplexArray) -> ComplexArray:
+    """(blocks, m, l) matrices that multiply series -H..H by the given ones (blocks, 2 H + 1), cut at H."""
+    size = series.shape[1]
+    index = np.subtract.outer(np.arange(size), np.arange(size)) + HARMONICS
+    return np.where((index >= 0) & (index < size), series[:, np.clip(index, 0, size - 1)], 0.0)
+
+
 def _hemisphere() -> tuple[Array, Array]:
     """Gauss nodes mu and weights of 2 mu d mu over the cosine-weighted hemisphere."""
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
     mu = 0.5 * (nodes + 1.0)
     return mu, weights * mu
-
-
-def _series(positive: dict[int, complex]) -> ComplexArray:
-    """Harmonics -H..H of a real function from its harmonics >= 0."""
-    series = np.zeros(2 * HARMONICS + 1, complex)
-    for harmonic, value in positive.items():
-        series[HARMONICS + harmonic] = value
-        series[HARMONICS - harmonic] = np.conj(value)
-    return series
-
-
-def _convolution(series: ComplexArray) -> ComplexArray:
-    """Matrix that multiplies a series -H..H by the given one, cut at H."""
-    size = len(series)
-    index = np.subtract.outer(np.arange(size), np.arange(size)) + HARMONICS
-    return np.where((index >= 0) & (index < size), series[np.clip(index, 0, size - 1)], 0.0)

@@ -43,6 +43,10 @@ class Registration:
         """Which points of the design lie at points (..., 2) of the probe frame [mm]."""
         return (np.asarray(points_mm, float) - self.shift_mm) @ np.linalg.inv(self.matrix).T
 
+    def cycles_per_mm(self, design_cycles_per_mm: ArrayLike) -> Array:
+        """Frequencies (..., 2) in the probe frame of stripes that were designed with the given ones [1/mm]."""
+        return np.asarray(design_cycles_per_mm, float) @ np.linalg.inv(self.matrix)
+
 
 @dataclass(frozen=True, slots=True)
 class Print:
@@ -76,6 +80,25 @@ class Print:
 
 
 @dataclass(frozen=True, slots=True)
+class BlockCorrections:
+    """What single blocks do beside the layers' model, as a correction of their paper's pattern; arrays by block."""
+
+    gain: Array
+    """(blocks,) factor on all that the paper reflects."""
+    offset: Array
+    """(blocks,) reflectance added to the paper's mean, relative to the unprinted paper."""
+    modulation: Array
+    """(blocks,) factor on the paper's stripes."""
+    phase_deg: Array
+    """(blocks,) the paper's stripes ahead of where the layers' registration has them [deg]."""
+
+    def __post_init__(self) -> None:
+        fields = (self.gain, self.offset, self.modulation, self.phase_deg)
+        if len({np.shape(values) for values in fields}) != 1 or not all(np.all(np.isfinite(v)) for v in fields):
+            raise ProbeError("a sheet's block corrections must be finite and as many of each kind as there are blocks")
+
+
+@dataclass(frozen=True, slots=True)
 class Assembly:
     """Film, paper and glass as they are; the default is exactly what was designed."""
 
@@ -85,6 +108,8 @@ class Assembly:
     """The paper."""
     glass_scale: float = 1.0
     """Thickness of the glass relative to the probe's."""
+    blocks: BlockCorrections | None = None
+    """Corrections of single blocks, in the order of the sheet's field."""
 
     def __post_init__(self) -> None:
         if not 0.5 < self.glass_scale < 2.0:

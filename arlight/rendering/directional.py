@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from arlight.rendering.reconstruction import Reconstruction, hemisphere_points
+from arlight.estimation.radiance_prior import hemisphere_points
+from arlight.rendering.reconstruction import Reconstruction
 
 Array = NDArray[np.float64]
 

@@ -15,25 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arlight.fourier import pack_real
+from arlight.estimation.radiance_prior import hemisphere_points, radiance_covariance, received_operator
 from arlight.optics import Slab
 
 Array = NDArray[np.float64]
 
-# Of 1:1, 1:10 and 1:100 with 0.15, 0.3 and 0.5 rad, this gave the least error of irradiance over twelve captured
-# environments; differences are small.
-_PRIOR_CONSTANT, _PRIOR_VARYING, _PRIOR_ANGLE_RAD = 1.0, 10.0, 0.3
 _TYPICAL_NOISE = 0.003
 """Standard deviation of a coefficient that S stands for, relative to the prior's rms of L~_0."""
-_GOLDEN_ANGLE_RAD = np.pi * (3.0 - np.sqrt(5.0))
-
-
-def hemisphere_points(count: int) -> Array:
-    """`count` equal-area directions (count, 3) of the upper hemisphere, z > 0, on a golden-angle spiral."""
-    index = np.arange(count)
-    z = 1.0 - (index + 0.5) / count
-    sine, azimuth = np.sqrt(1.0 - z**2), index * _GOLDEN_ANGLE_RAD
-    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +55,7 @@ class Reconstruction:
     def radiance_rows(self, directions: ArrayLike) -> Array:
         """Radiance rows (d, m) of any unit directions (d, 3); the ground's below the horizon."""
         w = np.asarray(directions, float)
-        upper = _prior(w, self.directions) @ self.prior_weights
+        upper = radiance_covariance(w, self.directions) @ self.prior_weights
         return np.where(w[:, 2:] >= 0.0, upper, self.ground_radiance_row)
 
     def irradiance_rows(self, normals: ArrayLike) -> Array:
@@ -97,24 +85,10 @@ def reconstruct(
         raise ValueError(f"surroundings_albedo must lie in [0, 1], found {surroundings_albedo}")
     directions = hemisphere_points(direction_count)
     operator = received_operator(slab, frequencies, directions, np.full(direction_count, 2.0 * np.pi / direction_count))
-    covariance_rows = _prior(directions, directions) @ operator.T
+    covariance_rows = radiance_covariance(directions, directions) @ operator.T
     gram = operator @ covariance_rows
     noise = _TYPICAL_NOISE**2 * gram[0, 0] * np.eye(len(gram))
     weights = np.linalg.solve(gram + noise, operator).T
-    return Reconstruction(directions, _prior(directions, directions) @ weights, weights, surroundings_albedo)
-
-
-def received_operator(slab: Slab, frequencies: ArrayLike, directions: Array, solid_angle_sr: Array) -> Array:
-    """A (m, n): real-packed coefficients of radiance given at directions (n, 3) with their solid angles (n,) [sr].
-
-    Source: paper, section 2.1, eqs 6-8: the kernel exp(-i 2 pi n.Delta) times T cos(theta) d omega.
-    """
-    cosine = directions[:, 2]
-    received = solid_angle_sr * cosine * slab.transmittance(cosine)
-    phase = np.asarray(frequencies, float) @ slab.light_plane(directions).T
-    return pack_real(received * np.exp(-2j * np.pi * phase))
-
-
-def _prior(first: Array, second: Array) -> Array:
-    angle = np.arccos(np.clip(first @ second.T, -1.0, 1.0))
-    return _PRIOR_CONSTANT + _PRIOR_VARYING * np.exp(-angle / _PRIOR_ANGLE_RAD)
+    return Reconstruction(
+        directions, radiance_covariance(directions, directions) @ weights, weights, surroundings_albedo
+    )

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.rendering.mesh import Mesh
-from arlight.rendering.reconstruction import Reconstruction, hemisphere_points
+from arlight.rendering.reconstruction import Reconstruction
 from arlight.rendering.shadow import PlaneShadow, plane_shadow
 from arlight.rendering.visibility import Progress, surface_offset_mm, visibility
 

@@ -10,8 +10,8 @@ MAX_COLUMNS = 16
 
 
 @njit(cache=True)
-def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, plane_from_ray, camera_mm, glass_mm,
-           index_squared, stride, pixels, positions, phases, first, views):  # fmt: skip
+def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, phase_rad, rays, plane_from_ray, camera_mm,
+           glass_mm, index_squared, stride, pixels, positions, phases, first, views):  # fmt: skip
     """List the pixels whose film point and paper point both lie inside their block.
 
     The paper point must keep `reach_mm` from the block's border, so that all light that reaches it came through the
@@ -59,7 +59,7 @@ def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, rays, pl
                 pixels[count] = row * w + column
                 positions[count, 0] = (px - cx) / paper_limit
                 positions[count, 1] = (py - cy) / paper_limit
-                phases[count] = 2.0 * np.pi * (fx * qx + fy * qy)
+                phases[count] = 2.0 * np.pi * (fx * qx + fy * qy) + phase_rad[block]
                 view_phase = 2.0 * np.pi * scale * (fx * vx + fy * vy)
                 sum_cos += np.cos(view_phase)
                 sum_sin += np.sin(view_phase)

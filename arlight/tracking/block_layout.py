@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Block, Probe
 from arlight.tracking.block_means import HARMONICS
 
@@ -24,6 +25,12 @@ def field_blocks(probe: Probe) -> tuple[Block, ...]:
     return tuple(block for block in probe.blocks if block.kind != "wedge")
 
 
+def design_cycles_per_mm(blocks: tuple[Block, ...], period_mm: float) -> Array:
+    """(blocks, 2) frequency n / P of each block's stripes as designed, 0 where there are none [1/mm]."""
+    frequencies = np.array([block.frequency or (0, 0) for block in blocks], float).reshape(-1, 2)
+    return np.asarray(frequencies / period_mm, float)
+
+
 @dataclass(frozen=True)
 class BlockLayout:
     """The blocks' geometry on the sheet, as arrays."""
@@ -34,16 +41,20 @@ class BlockLayout:
     """(blocks,) half the side [mm]."""
     cycles_per_mm: Array
     """(blocks, 2) frequency of the film's pattern, 0 where there is none [1/mm]."""
+    phase_rad: Array
+    """(blocks,) phase of the film's pattern at the probe frame's origin [rad]."""
 
     @classmethod
-    def of_probe(cls, probe: Probe) -> "BlockLayout":
-        """The layout of a sheet's field."""
+    def of_probe(cls, probe: Probe, assembly: Assembly | None = None) -> "BlockLayout":
+        """The layout of a sheet's field; its patterns lie where the assembled film has them."""
         blocks = field_blocks(probe)
-        frequencies = np.array([block.frequency or (0, 0) for block in blocks], float).reshape(-1, 2)
+        film = (assembly or Assembly()).film.registration
+        cycles = film.cycles_per_mm(design_cycles_per_mm(blocks, probe.slab.period_mm))
         return cls(
             np.array([block.center_mm for block in blocks], float).reshape(-1, 2),
             np.array([block.size_mm / 2.0 for block in blocks]),
-            frequencies / probe.slab.period_mm,
+            cycles,
+            -2.0 * np.pi * cycles @ np.array(film.shift_mm),
         )
 
     def view(self, camera: Camera, pose: Pose, blur_px: float) -> "BlockView":

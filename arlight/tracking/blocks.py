@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
 from arlight.color import linear_from_encoded
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking import block_kernels as kernels
 from arlight.tracking.block_color import chroma_correction, color_line
@@ -37,15 +38,16 @@ _UNRESOLVED_BLUR_PX = 0.6
 class BlockMeter:
     """Measures a sheet's blocks in frames of one camera; buffers are allocated once."""
 
-    def __init__(self, probe: Probe, camera: Camera, max_samples: int = 1200) -> None:
+    def __init__(self, probe: Probe, camera: Camera, max_samples: int = 1200, assembly: Assembly | None = None) -> None:
         """Prepare for a sheet and a camera.
 
         Args:
+            assembly: where the sheet's film lies and how thick its glass is, when that is known.
             max_samples: pixels a block is sampled with at most; larger images are strided.
         """
         self._camera = camera
-        self._slab = probe.slab
-        self._layout = BlockLayout.of_probe(probe)
+        self._slab = (assembly or Assembly()).slab(probe)
+        self._layout = BlockLayout.of_probe(probe, assembly)
         blocks = field_blocks(probe)
         self._patterned = np.array([block.kind == "pattern" for block in blocks])
         self._white = np.array([block.kind == "clear_white" for block in blocks])
@@ -96,8 +98,8 @@ class BlockMeter:
         layout = self._layout
         kernels.gather(
             view.boxes, layout.centers_mm, layout.half_mm, self._slab.max_offset_mm, view.margin_mm,
-            layout.cycles_per_mm, self._rays, plane_from_ray, pose.camera_centre_mm, self._slab.glass_mm,
-            self._slab.refractive_index**2, stride, self._pixels, self._positions, self._phases, self._first,
+            layout.cycles_per_mm, layout.phase_rad, self._rays, plane_from_ray, pose.camera_centre_mm,
+            self._slab.glass_mm, self._slab.refractive_index**2, stride, self._pixels, self._positions, self._phases, self._first,
             self._views,
         )  # fmt: skip
         return int(self._first[-1])

@@ -23,11 +23,9 @@ def white(probe, random_light):
 def fit(probe, response, white):
     """Fit green with a wide prior and a reflection that is a plane over the sheet."""
     blocks = field_blocks(probe)
-    index = {tuple(n): k for k, n in enumerate(probe.frequencies.tolist())}
-    column = np.array([index[block.frequency] if block.frequency else 0 for block in blocks])
     plane = np.column_stack([np.ones(len(blocks)), np.array([block.center_mm for block in blocks]) / 50.0])
     unknown = 2 * len(probe.frequencies) - 1 + plane.shape[1]
-    system = BlockSystem(column, column > 0, plane, np.zeros(unknown), np.full(unknown, 100.0))
+    system = BlockSystem(response.places, plane, np.zeros(unknown), np.full(unknown, 100.0))
     model = np.full(len(blocks), 0.001)
 
     def solve(means, nuisance=None, passes=1):

@@ -8,6 +8,7 @@ from arlight.estimation.normal_equations import BlockSystem
 COEFFICIENTS, FIELD, ROWS = 9, 4, 7
 COLUMN = np.array([1, 2, 3, 4, 1, 0, 2, 0, 4, 4, 3])
 PATTERNED = COLUMN > 0
+PLACES = np.stack([0 * COLUMN, np.where(PATTERNED, 2 * COLUMN - 1, 0), 2 * COLUMN], axis=1)
 
 
 class Problem:
@@ -29,7 +30,7 @@ class Problem:
         self.precision = factors @ factors.swapaxes(1, 2)
 
     def system(self):
-        return BlockSystem(COLUMN, PATTERNED, self.basis, self.expected, self.deviation)
+        return BlockSystem(PLACES, self.basis, self.expected, self.deviation)
 
     def solve(self):
         return self.system().solve(self.design, self.mirror, self.values, self.precision)

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from arlight.estimation.stack import (
-    HARMONICS,
-    film_harmonics,
-    lower_face_return,
-    paper_harmonics,
-    paper_light,
-    upper_face_return,
-)
+from arlight.estimation.layer_series import HARMONICS, film_series, paper_series
+from arlight.estimation.stack import lower_face_return, paper_light, upper_face_return
 from arlight.optics import Slab
+from arlight.probe.assembly import Print
 from arlight.probe.design import Block, Probe
 
 INDEX = 1.52
@@ -73,8 +68,12 @@ def test_series_are_the_printed_layers(design, phases):
     for phase_deg in phases:
         block = block_of("pattern", (2, 1), float(phase_deg))
         film, paper = printed(design, phase_deg, PSI)
-        np.testing.assert_allclose(at(film_harmonics(block, design), PSI), film, atol=1e-12)
-        np.testing.assert_allclose(at(paper_harmonics(block, design), PSI), paper, atol=1e-12)
+        np.testing.assert_allclose(
+            at(film_series((block,), design, Print(), np.zeros((1, 2)))[0], PSI), film, atol=1e-12
+        )
+        np.testing.assert_allclose(
+            at(paper_series((block,), design, Print(), np.zeros((1, 2)))[0], PSI), paper, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("design", ["matched", "doubled"])
@@ -83,8 +82,16 @@ def test_series_are_the_printed_layers(design, phases):
     [("clear_white", 1, 1), ("clear_black", 1, 0), ("black_white", 0, 1), ("black_black", 0, 0)],
 )
 def test_regions_without_pattern_are_uniform(design, kind, film, paper):
-    np.testing.assert_array_equal(at(film_harmonics(block_of(kind), design), PSI), np.full(PSI.shape, film))
-    np.testing.assert_array_equal(at(paper_harmonics(block_of(kind), design), PSI), np.full(PSI.shape, paper))
+    np.testing.assert_allclose(
+        at(film_series((block_of(kind),), design, Print(), np.zeros((1, 2)))[0], PSI),
+        np.full(PSI.shape, film),
+        atol=1e-15,
+    )
+    np.testing.assert_allclose(
+        at(paper_series((block_of(kind),), design, Print(), np.zeros((1, 2)))[0], PSI),
+        np.full(PSI.shape, paper),
+        atol=1e-15,
+    )
 
 
 @pytest.mark.parametrize(("design", "phase_deg"), [("matched", 90.0), ("matched", 180.0), ("doubled", 0.0)])

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from arlight.environment import Environment
+from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.fourier import pack_real
 from arlight.rendering.directional import directional_lights
-from arlight.rendering.reconstruction import hemisphere_points
 from arlight.synthetic.captured import load_environment
 
 

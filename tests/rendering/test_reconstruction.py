@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from arlight.environment import Environment
+from arlight.estimation.radiance_prior import hemisphere_points, received_operator
 from arlight.fourier import half_plane_frequencies, pack_real
 from arlight.optics import Slab
-from arlight.rendering.reconstruction import hemisphere_points, received_operator, reconstruct
+from arlight.rendering.reconstruction import reconstruct
 from arlight.synthetic.captured import captured_names, load_environment
 
 UNIFORM = Environment(np.ones((64, 128, 3), np.float32))

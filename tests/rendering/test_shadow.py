@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.fourier import pack_real
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.reconstruction import hemisphere_points
 from arlight.rendering.shadow import PlaneGrid, PlaneShadow
 from arlight.rendering.transfer import precompute_transfer
 from arlight.synthetic.captured import load_environment

@@ -5,10 +5,11 @@ import pytest
 import trimesh
 
 from arlight.environment import Environment
+from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.fourier import pack_real
 from arlight.rendering.mesh import joined
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.reconstruction import hemisphere_points, reconstruct
+from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.transfer import harmonics, precompute_transfer
 
 pytestmark = pytest.mark.usefixtures("gl")

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.reconstruction import hemisphere_points
 from arlight.rendering.visibility import surface_offset_mm, visibility
 
 pytestmark = pytest.mark.usefixtures("gl")

@@ -27,7 +27,7 @@ def gathered(camera, pose, margin_mm=0.4, stride=1, capacity=300_000):
     phases, first, views = np.empty(capacity), np.empty(count + 1, np.int64), np.empty((count, 3))
     kernels.gather(
         boxes, LAYOUT.centers_mm, LAYOUT.half_mm, SLAB.max_offset_mm, np.full((count, 2), margin_mm),
-        LAYOUT.cycles_per_mm, camera.ray_map, plane_from_ray, pose.camera_centre_mm, SLAB.glass_mm,
+        LAYOUT.cycles_per_mm, LAYOUT.phase_rad, camera.ray_map, plane_from_ray, pose.camera_centre_mm, SLAB.glass_mm,
         SLAB.refractive_index**2, np.full(count, stride), pixels, positions, phases, first, views,
     )  # fmt: skip
     return pixels, positions, phases, first, views

@@ -1,0 +1,43 @@
+"""What is known about radiance before anything is measured, and the operator that makes coefficients of it.
+
+The coefficients are integrals of the radiance l over the upper hemisphere, L~ = A l, with a known smooth operator A,
+and natural light is a smooth isotropic random field of covariance C(w, w') = c0 + c1 exp(-angle(w, w') / a).
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from arlight.fourier import pack_real
+from arlight.optics import Slab
+
+Array = NDArray[np.float64]
+
+# Of 1:1, 1:10 and 1:100 with 0.15, 0.3 and 0.5 rad, this gave the least error of irradiance over twelve captured
+# environments; differences are small.
+_PRIOR_CONSTANT, _PRIOR_VARYING, _PRIOR_ANGLE_RAD = 1.0, 10.0, 0.3
+_GOLDEN_ANGLE_RAD = np.pi * (3.0 - np.sqrt(5.0))
+
+
+def hemisphere_points(count: int) -> Array:
+    """`count` equal-area directions (count, 3) of the upper hemisphere, z > 0, on a golden-angle spiral."""
+    index = np.arange(count)
+    z = 1.0 - (index + 0.5) / count
+    sine, azimuth = np.sqrt(1.0 - z**2), index * _GOLDEN_ANGLE_RAD
+    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=-1)
+
+
+def received_operator(slab: Slab, frequencies: ArrayLike, directions: Array, solid_angle_sr: Array) -> Array:
+    """A (m, n): real-packed coefficients of radiance given at directions (n, 3) with their solid angles (n,) [sr].
+
+    Source: paper, section 2.1, eqs 6-8: the kernel exp(-i 2 pi n.Delta) times T cos(theta) d omega.
+    """
+    cosine = directions[:, 2]
+    received = solid_angle_sr * cosine * slab.transmittance(cosine)
+    phase = np.asarray(frequencies, float) @ slab.light_plane(directions).T
+    return pack_real(received * np.exp(-2j * np.pi * phase))
+
+
+def radiance_covariance(first: Array, second: Array) -> Array:
+    """C (d, e) between unit directions (d, 3) and (e, 3), on a scale of its own."""
+    angle = np.arccos(np.clip(first @ second.T, -1.0, 1.0))
+    return np.asarray(_PRIOR_CONSTANT + _PRIOR_VARYING * np.exp(-angle / _PRIOR_ANGLE_RAD), float)

@@ -1,0 +1,61 @@
+"""Coefficients at whole frequencies from those at the frequencies that an assembled sheet really measures.
+
+Stripes keep the period they were printed with. On glass of another thickness, or turned with the film, they measure
+the light's transform between the whole frequencies. The transform is smooth, for all light lies within a disk of
+diameter 1, so the whole frequencies follow by linear prediction under the prior of natural light.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.estimation.radiance_prior import hemisphere_points, radiance_covariance, received_operator
+from arlight.probe.assembly import Assembly
+from arlight.probe.design import Probe
+
+Array = NDArray[np.float64]
+
+_DIRECTIONS = 1024
+_NOISE = 0.003
+"""Standard deviation of the measured coefficients that the prediction allows for, relative to the prior's L~_0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Resampling:
+    """Linear prediction of the coefficients at the sheet's whole frequencies (m = 2k - 1 real unknowns)."""
+
+    matrix: Array
+    """(m, m): whole-frequency coefficients from the measured ones, real-packed."""
+    missing: Array
+    """(m, m) covariance of what no measured coefficient tells, for L~_0 = 1."""
+
+    def apply(self, packed: Array, covariance: Array) -> tuple[Array, Array]:
+        """Coefficients (m,) at whole frequencies with their covariance (m, m)."""
+        values = self.matrix @ packed
+        return values, self.matrix @ covariance @ self.matrix.T + self.missing * values[0] ** 2
+
+
+def measured_frequencies(probe: Probe, assembly: Assembly) -> Array:
+    """(k, 2) frequencies in the light plane of the assembled glass that the sheet's stripes have."""
+    cycles = assembly.film.registration.cycles_per_mm(probe.frequencies / probe.slab.period_mm)
+    return np.asarray(cycles * assembly.slab(probe).period_mm, float)
+
+
+def resampling(probe: Probe, assembly: Assembly) -> Resampling | None:
+    """Build the prediction for a sheet; None when its stripes have whole frequencies."""
+    measured = measured_frequencies(probe, assembly)
+    if np.allclose(measured, probe.frequencies, atol=1e-9):
+        return None
+    slab = assembly.slab(probe)
+    directions = hemisphere_points(_DIRECTIONS)
+    solid_angle = np.full(_DIRECTIONS, 2.0 * np.pi / _DIRECTIONS)
+    seen = received_operator(slab, measured, directions, solid_angle)
+    wanted = received_operator(slab, probe.frequencies, directions, solid_angle)
+    prior = radiance_covariance(directions, directions)
+    scale = float(wanted[0] @ prior @ wanted[0])
+    gram = seen @ prior @ seen.T / scale
+    cross = wanted @ prior @ seen.T / scale
+    matrix = np.linalg.solve(gram + _NOISE**2 * np.eye(len(gram)), cross.T).T
+    missing = wanted @ prior @ wanted.T / scale - matrix @ cross.T
+    return Resampling(matrix, 0.5 * (missing + missing.T))
