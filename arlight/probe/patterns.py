@@ -31,11 +31,11 @@ def film(probe: Probe) -> Raster:
     width, height = (side + 2.0 * probe.slab.period_mm for side in window_mm(probe))
     raster[_rectangle(probe, width, height)] = 0.0
     for block in _field(probe):
-        rows, columns = _pixels(probe, block)
+        rows, columns = block_pixels(probe, block)
         if block.frequency is None:
             raster[rows, columns] = 0.0 if block.kind in _FILM_BLACK else 1.0
         else:
-            raster[rows, columns] = film_transmittance(_phase(probe, block, rows, columns), probe.design)
+            raster[rows, columns] = film_transmittance(stripe_phase(probe, block, rows, columns), probe.design)
     return raster
 
 
@@ -43,11 +43,11 @@ def paper(probe: Probe) -> Raster:
     """Reflectance of the paper relative to the unprinted paper, in [0, 1]; white outside the block field."""
     raster = np.ones(raster_shape(probe), np.float32)
     for block in _field(probe):
-        rows, columns = _pixels(probe, block)
+        rows, columns = block_pixels(probe, block)
         if block.frequency is None or block.phase_deg is None:
             raster[rows, columns] = 0.0 if block.kind in _PAPER_BLACK else 1.0
         else:
-            phase = _phase(probe, block, rows, columns)
+            phase = stripe_phase(probe, block, rows, columns)
             raster[rows, columns] = paper_reflectance(phase, np.radians(block.phase_deg), probe.design)
     return raster
 
@@ -57,7 +57,7 @@ def frame(probe: Probe) -> tuple[Raster, NDArray[np.bool_]]:
     reflectance = np.ones(raster_shape(probe), np.float32)
     for block in probe.blocks:
         if block.reflectance is not None:
-            reflectance[_pixels(probe, block)] = block.reflectance
+            reflectance[block_pixels(probe, block)] = block.reflectance
     for marker in probe.markers:
         _draw_marker(reflectance, marker, probe)
     window = np.zeros(raster_shape(probe), bool)
@@ -88,8 +88,8 @@ def _field(probe: Probe) -> list[Block]:
     return [block for block in probe.blocks if block.kind != "wedge"]
 
 
-def _pixels(probe: Probe, block: Block) -> tuple[slice, slice]:
-    """Rows and columns whose pixel centres lie in the block."""
+def block_pixels(probe: Probe, block: Block) -> tuple[slice, slice]:
+    """Rows and columns of the sheet's rasters whose pixel centres lie in the block."""
     (x, y), half = block.center_mm, block.size_mm / 2.0
     return _span(probe, -y - half, block.size_mm, 1), _span(probe, x - half, block.size_mm, 0)
 
@@ -107,7 +107,7 @@ def _span(probe: Probe, start_mm: float, length_mm: float, axis: int) -> slice:
     return slice(max(first, 0), max(end, 0))
 
 
-def _phase(probe: Probe, block: Block, rows: slice, columns: slice) -> Raster:
+def stripe_phase(probe: Probe, block: Block, rows: slice, columns: slice) -> Raster:
     """phi = 2 pi n.x/P at pixel centres [rad]."""
     assert block.frequency is not None
     u, v = block.frequency
