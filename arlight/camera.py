@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.errors import CameraError
+from arlight.radiometry import Radiometry
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ class Camera:
     vignetting: tuple[float, float, float] | None = None
     """(k1, k2, k3) of the radial gain 1 + k1 r^2 + k2 r^4 + k3 r^6, r the distance from the principal point in half
     diagonals of the picture; None for an even gain."""
+    radiometry: Radiometry | None = None
+    """How codes stand for light in this camera; None to believe the footage's own transfer curve."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "camera_matrix", np.asarray(self.camera_matrix, float))
@@ -42,7 +45,7 @@ class Camera:
 
     @classmethod
     def load(cls, path: Path | str) -> "Camera":
-        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion and, where known, vignetting.
+        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion, and vignetting and radiometry where known.
 
         Raises:
             CameraError: the file is missing, is not JSON, or holds impossible values.
@@ -51,11 +54,13 @@ class Camera:
         try:
             content: dict[str, Any] = json.loads(path.read_text())
             width, height = content["image_size"]
+            radiometry = content.get("radiometry")
             return cls(
                 (int(width), int(height)),
                 content["camera_matrix"],
                 content.get("distortion", [0.0] * 5),
                 content.get("vignetting"),
+                None if radiometry is None else Radiometry.of_content(radiometry),
             )
         except OSError as error:
             raise CameraError(f"{path}: cannot be read ({error.strerror}); a camera.json is expected there") from error
@@ -75,6 +80,8 @@ class Camera:
         }
         if self.vignetting is not None:
             content["vignetting"] = list(self.vignetting)
+        if self.radiometry is not None:
+            content["radiometry"] = self.radiometry.content()
         Path(path).write_text(json.dumps(content, indent=1) + "\n")
 
     def project(self, camera_from_probe: "Pose", points_mm: ArrayLike) -> Array:

@@ -196,7 +196,8 @@ class _Normal:
         matrix, right = self.matrix.copy(), self.right.copy()
         gains: list[Array] = []
         for c, b, r in zip(self.pose_matrix, self.pose_cross, self.pose_right, strict=True):
-            gain: Array = np.linalg.solve(c + damping * np.diag(np.diag(c)), np.column_stack([b.T, r]))
+            damped = c + damping * np.diag(np.diag(c))
+            gain = np.asarray(np.linalg.solve(damped, np.column_stack([b.T, r])), float)
             matrix -= b @ gain[:, :-1]
             right -= b @ gain[:, -1]
             gains.append(gain)

@@ -1,7 +1,7 @@
 """Where each fiducial of the sheet is in a picture, by aligning it to the picture by itself.
 
 ArUco's corners are drawn inward by blur; their diagonals' crossing is not, and serves to begin with. What alignment
-then finds is free of blur, of the markers' lighting and, to first order, of errors of the intrinsics that it starts from.
+then finds is free of blur, of the markers' lighting and, to first order, of errors of the intrinsics it starts from.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from arlight.calibration.camera_fit import TargetView
 from arlight.camera import Camera, Pose
 from arlight.probe.design import Probe
-from arlight.tracking.alignment import SAMPLING_VARIANCE_PX2, FiducialAlignment, Picture
+from arlight.tracking.alignment import FiducialAlignment, Picture
 from arlight.tracking.alignment_kernels import FEATURES, LIGHTING, POSE, linearise
 from arlight.tracking.fiducials import Detection, FiducialDetector
 from arlight.tracking.lens import camera_parameters
@@ -143,17 +143,11 @@ class MarkerPoints:
         return points, values
 
 
-def lens_blur_px(blur_px: float) -> float:
-    """Blur beyond the pixel's own square and the interpolation between pixels, of a whole blur [px]."""
-    return float(np.sqrt(max(blur_px**2 - SAMPLING_VARIANCE_PX2, 0.0)))
-
-
 def _steps(gram: Array, gain: Array, at_mm: Array, pose: Pose) -> Array:
     """(m, 2) steps on the sheet that the markers' own equations ask for [mm]."""
     matrix, right = gram[:, 7:9, 7:9], gram[:, 7:9, 10:] / gain[:, None, None]
-    across: Array = -np.linalg.solve(
-        matrix + 1e-9 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(2), right
-    )
+    sound = matrix + 1e-9 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+    across = -np.asarray(np.linalg.solve(sound, right), float)
     seen = pose.transform(np.column_stack([at_mm, np.zeros(len(at_mm))]))
     sight = seen[:, :2, None] / seen[:, 2:, None]
     on_sheet = pose.rotation[:2, :2] - sight * pose.rotation[2, :2]
