@@ -12,6 +12,7 @@ from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import orders_up_to
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.blocks import BlockMeter
 from arlight.tracking.luma import luma_codes
@@ -67,18 +68,25 @@ class LightingTracker:
         probe: the sheet.
         camera: intrinsics of the camera that filmed it.
         settings: choices that trade speed for accuracy.
+        assembly: what calibration found the printed sheet to be; exactly as designed by default.
 
     Raises:
         ProbeError: the sheet's fiducials are unknown to ArUco, or it does not measure the order that is asked for.
     """
 
-    def __init__(self, probe: Probe, camera: Camera, settings: TrackerSettings | None = None) -> None:
+    def __init__(
+        self,
+        probe: Probe,
+        camera: Camera,
+        settings: TrackerSettings | None = None,
+        assembly: Assembly | None = None,
+    ) -> None:
         self._settings = settings or TrackerSettings()
         if self._settings.order is not None:
             orders_up_to(probe.frequencies, self._settings.order)
         self._tracker = PoseTracker(probe, camera)
-        self._meter = BlockMeter(probe, camera, self._settings.samples_per_block)
-        self._estimator = LightingEstimator(probe, bounces=self._settings.bounces)
+        self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
+        self._estimator = LightingEstimator(probe, assembly, bounces=self._settings.bounces)
         self._filter = LightingFilter()
         self.reset()
 

@@ -7,6 +7,7 @@ from typing import Protocol
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
 from arlight.lighting_tracker import FrameEstimate, LightingTracker, TrackerSettings
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.pose import ProbePose
 from arlight.video.frame import Frame
@@ -50,6 +51,7 @@ class Pipeline:
         camera: Camera,
         relighter: FrameRelighter | None = None,
         settings: TrackerSettings | None = None,
+        assembly: Assembly | None = None,
     ) -> None:
         """Prepare the loop.
 
@@ -58,11 +60,12 @@ class Pipeline:
             camera: the camera that filmed it.
             relighter: draws the object; None leaves the frames as they are (lighting only).
             settings: choices of the estimation.
+            assembly: what calibration found the printed sheet to be.
 
         Raises:
             ProbeError: the sheet cannot be tracked.
         """
-        self._tracker = LightingTracker(probe, camera, settings)
+        self._tracker = LightingTracker(probe, camera, settings, assembly)
         self._relighter = relighter
 
     def process(self, frame: Frame) -> FrameResult:

@@ -58,4 +58,4 @@ def resampling(probe: Probe, assembly: Assembly) -> Resampling | None:
     cross = wanted @ prior @ seen.T / scale
     matrix = np.linalg.solve(gram + _NOISE**2 * np.eye(len(gram)), cross.T).T
     missing = wanted @ prior @ wanted.T / scale - matrix @ cross.T
-    return Resampling(matrix, 0.5 * (missing + missing.T))
+    return Resampling(np.asarray(matrix, float), np.asarray(0.5 * (missing + missing.T), float))

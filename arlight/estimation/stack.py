@@ -1,10 +1,10 @@
 """What film, glass and paper make of the light: the paper's brightness as a linear function of the coefficients.
 
 Along a block's frequency n everything repeats, so every quantity is a short Fourier series in the phase psi of the
-film's pattern above the paper point. Light enters through the film (paper, eqs 3-4), is scattered by the paper, and a part of
-it comes back: from the lower face of the glass at once, from the upper face after two more passes through the film,
-2 D(w) to the side. Both returns are linear, hence one small linear system a block, solved once. It does not depend on
-the view.
+film's pattern above the paper point. Light enters through the film (paper, eqs 3-4), is scattered by the paper, and a
+part of it comes back: from the lower face of the glass at once, from the upper face after two more passes through the
+film, 2 D(w) to the side. Both returns are linear, hence one small linear system a block, solved once. It does not
+depend on the view.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """What a sheet became when it was printed and put together: the layers' registration, their prints, the glass.
 
-A design is drawn exactly; printers blur it, let dots grow and leave ink that is not black, and hands lay film and paper a
-little aside. All of it is known to a simulator and estimated by calibration.
+A design is drawn exactly; printers blur it, let dots grow and leave ink that is not black, and hands lay film and
+paper a little aside. All of it is known to a simulator and estimated by calibration.
 """
 
 from dataclasses import dataclass, field

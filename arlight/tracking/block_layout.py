@@ -73,7 +73,11 @@ class BlockLayout:
         boxes = np.concatenate([np.floor(pixels.min(axis=1)), np.ceil(pixels.max(axis=1))], axis=1)
         limits = np.array([*camera.image_size, *camera.image_size], float)
         return BlockView(
-            np.clip(boxes, -1.0, limits).astype(np.int64), margin, cycles_per_px, _harmonics(cycles_per_px)
+            np.clip(boxes, -1.0, limits).astype(np.int64),
+            margin,
+            cycles_per_px,
+            _harmonics(cycles_per_px),
+            camera.gain(pixels[:, 0]),
         )
 
 
@@ -89,6 +93,8 @@ class BlockView:
     """(blocks, 2) frequency of the film's pattern in the image [1/px]."""
     harmonics: NDArray[np.int64]
     """(blocks,) how many harmonics the pixels can separate."""
+    gain: Array
+    """(blocks,) the lens's vignetting in the middle of each block."""
 
 
 def _harmonics(cycles_per_px: Array) -> NDArray[np.int64]:

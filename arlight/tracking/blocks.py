@@ -83,7 +83,8 @@ class BlockMeter:
         self._read(frame, count)
         trust = np.ones(len(self._first) - 1)
         if max(frame.format.chroma_shift) > 0:
-            trust = self._infer_chroma(frame, view, count, stripes)
+            seen = None if stripes is None else stripes * view.gain[:, None, None]
+            trust = self._infer_chroma(frame, view, count, seen)
         table = decoding_table(frame.format.transfer)[:-1]
         matrix = frame.format.rgb_from_ycc().astype(float)
         kernels.linearise(self._encoded, count, matrix, table, self._linear)
@@ -99,8 +100,8 @@ class BlockMeter:
         kernels.gather(
             view.boxes, layout.centers_mm, layout.half_mm, self._slab.max_offset_mm, view.margin_mm,
             layout.cycles_per_mm, layout.phase_rad, self._rays, plane_from_ray, pose.camera_centre_mm,
-            self._slab.glass_mm, self._slab.refractive_index**2, stride, self._pixels, self._positions, self._phases, self._first,
-            self._views,
+            self._slab.glass_mm, self._slab.refractive_index**2, stride, self._pixels, self._positions, self._phases,
+            self._first, self._views,
         )  # fmt: skip
         return int(self._first[-1])
 
@@ -192,11 +193,12 @@ class BlockMeter:
         gathered = np.diff(self._first)
         valid = (fit.samples >= _MIN_SAMPLES) & (fit.samples >= _UNCLIPPED_SHARE * gathered)
         views = self._views / np.maximum(gathered, 1)[:, None]
+        gain = view.gain[:, None]
         return BlockMeans(
-            values=fit.coefficients,
+            values=fit.coefficients / gain[..., None],
             covariance=fit.covariance,
-            pixel_variance=fit.variance,
-            shading=uneven,
+            pixel_variance=fit.variance / gain**2,
+            shading=uneven / gain,
             harmonics=np.where(fit.samples > 0, view.harmonics, 0),
             samples=fit.samples,
             valid=valid,
