@@ -45,7 +45,7 @@ class Camera:
 
     @classmethod
     def load(cls, path: Path | str) -> "Camera":
-        """Read camera.json: image_size [w, h], camera_matrix 3x3, distortion, and vignetting and radiometry where known.
+        """Read camera.json: image_size, camera_matrix, distortion; vignetting and radiometry where known.
 
         Raises:
             CameraError: the file is missing, is not JSON, or holds impossible values.
