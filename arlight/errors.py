@@ -24,6 +24,10 @@ class VideoError(ArlightError):
     """A video that cannot be read or written."""
 
 
+class CalibrationError(ArlightError):
+    """Footage that does not tell what was to be calibrated."""
+
+
 class MeshError(ArlightError):
     """An object that cannot be lit."""
 
