@@ -5,6 +5,7 @@ from itertools import chain
 from pathlib import Path
 
 from arlight.errors import OutputError
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.probe.storage import save_probe
 from arlight.synthetic.settings import SynthesisSettings
@@ -25,6 +26,7 @@ def write_clip(
     settings: SynthesisSettings,
     probe: Probe,
     layers: SheetLayers | None = None,
+    assembly: Assembly | None = None,
     crf: int = CRF,
     preset: str = PRESET,
     watch: Callable[[SyntheticFrame], None] | None = None,
@@ -39,7 +41,7 @@ def write_clip(
         name: of the clip, without an ending.
         settings: light, path, camera, sensor.
         probe: the sheet.
-        layers: its printed layers; drawn from the probe's design by default.
+        layers, assembly: its printed layers, and how they were put together, as in `synthesize`.
         crf: quality of libx264, lower is better.
         preset: speed of libx264.
         watch: called with every frame after it was written.
@@ -58,7 +60,7 @@ def write_clip(
         if path.exists():
             raise OutputError(f"{path}: is there already; choose another name or folder, or remove it first")
     frames: list[FrameTruth] = []
-    source = synthesize(settings, probe, layers)
+    source = synthesize(settings, probe, layers, assembly)
     # light and OpenGL are refused before anything is written
     first = next(source)
     _write_sidecar(folder, name, "probe", lambda path: save_probe(probe, path))

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
+from arlight.synthetic.assembled import assembled_layers
 from arlight.synthetic.captured import load_environment
 from arlight.synthetic.light_script import LightScript, TrueLight, exposure_for
 from arlight.synthetic.motion import CameraMotion
@@ -28,7 +30,7 @@ class SyntheticFrame:
 
 
 def synthesize(
-    settings: SynthesisSettings, probe: Probe, layers: SheetLayers | None = None
+    settings: SynthesisSettings, probe: Probe, layers: SheetLayers | None = None, assembly: Assembly | None = None
 ) -> Generator[SyntheticFrame]:
     """Film a sheet.
 
@@ -39,7 +41,8 @@ def synthesize(
     Args:
         settings: light, path, camera, sensor.
         probe: the sheet.
-        layers: its printed layers; drawn from the probe's design by default.
+        layers: its printed layers; drawn from the probe's design, or from the assembly, by default.
+        assembly: how it was printed and put together; exactly as designed by default.
 
     Yields:
         The frames in order. The iterator belongs to the thread that asks for its first frame.
@@ -56,8 +59,9 @@ def synthesize(
     motion = CameraMotion(settings.path, settings.sheet_width_px, settings.tilt_deg, settings.duration_s, settings.seed)
     noise = np.random.default_rng(settings.seed)
     sampling = Sampling(settings.sample_mm, settings.samples_per_side)
-    printed = SheetLayers.of_probe(probe) if layers is None else layers
-    stage = Stage(printed, probe.slab, camera, script, settings.bounces, sampling)
+    assembly = assembly or Assembly()
+    printed = assembled_layers(probe, assembly) if layers is None else layers
+    stage = Stage(printed, assembly.slab(probe), camera, script, settings.bounces, sampling)
     try:
         for index in range(settings.frame_count):
             time_s = float(index / settings.frame_rate)
