@@ -5,7 +5,7 @@ motion tell where the layers lie, how thick the glass is and what the printer ma
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,12 +92,6 @@ def self_calibrate(
         assembly = assembly_of(vector)
     assert solution is not None
     return _result(solution, len(chosen))
-
-
-def with_vignetting(camera: Camera, calibration: SelfCalibration) -> Camera:
-    """The camera with the vignetting that self-calibration found, on top of its own."""
-    own = np.array(camera.vignetting or (0.0, 0.0, 0.0))
-    return replace(camera, vignetting=tuple(own + np.array(calibration.vignetting)))
 
 
 def _result(solution: LayerSolution, views: int) -> SelfCalibration:

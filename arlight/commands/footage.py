@@ -1,18 +1,23 @@
 """A clip with the probe and the camera that belong to it, and what to say when the sheet was never seen."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.calibration.focal_length import estimate_camera
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
-from arlight.errors import ArlightError, CameraError, ProbeError, VideoError
+from arlight.commands.self_calibration import self_calibrate_clip
+from arlight.errors import ArlightError, CalibrationError, CameraError, ProbeError, VideoError
+from arlight.probe.assembly import Assembly
+from arlight.probe.assembly_storage import load_assembly, load_vignetting
 from arlight.probe.design import Probe
 from arlight.probe.storage import load_probe
 from arlight.results.statistics import RunStatistics
+from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.recognition import ids_text, markers_of, recognise_markers, same_family
 from arlight.video.reader import VideoReader
 from arlight.video.sidecars import find_sidecar
@@ -25,13 +30,23 @@ _UNEXPLAINED_LIMIT = 0.35
 
 
 @dataclass(frozen=True)
-class FootageOptions:
+class SheetAndCamera:
     """What was filmed, and with what; found beside the clip where it is not given."""
 
     probe: OptionalFile = None
     """probe.json of the sheet that was filmed."""
     camera: OptionalFile = None
-    """camera.json of the camera that filmed it: image_size, camera_matrix and distortion."""
+    """camera.json of the camera that filmed it; without one the focal length is estimated from the clip."""
+
+
+@dataclass(frozen=True)
+class FootageOptions(SheetAndCamera):
+    """What was filmed, with what, and how the sheet turned out; found beside the clip where it is not given."""
+
+    calibration: OptionalFile = None
+    """NAME.calibration.json of the sheet as it was printed and put together, from `arlight calibrate`."""
+    self_calibrate: bool = False
+    """Calibrate the sheet on the first seconds of the clip itself; the camera must move over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +61,12 @@ class Footage:
     """The camera that filmed it."""
     probe_path: Path
     """Where the probe was read from."""
-    camera_path: Path
-    """Where the camera was read from."""
+    camera_path: Path | None
+    """Where the camera was read from; None when it was estimated from the clip."""
+    assembly: Assembly | None = None
+    """The sheet as it was printed and put together; None for exactly as designed."""
+    notes: tuple[str, ...] = ()
+    """What the user should know of how probe, camera and calibration were come by."""
 
     def __enter__(self) -> "Footage":
         return self
@@ -57,34 +76,69 @@ class Footage:
 
 
 def open_footage(clip: Path, options: FootageOptions) -> Footage:
-    """Open a clip with its probe and camera.
+    """Open a clip with its probe, camera and calibration.
 
     Raises:
         VideoError: the clip cannot be read.
-        ProbeError: no probe was found, or it cannot be used.
-        CameraError: no camera was found, it cannot be used, or it is of another picture size.
+        ProbeError: no probe was found, or it or the calibration cannot be used.
+        CameraError: the camera cannot be used, is of another picture size, or cannot be estimated.
+        CalibrationError: self-calibration was asked for, and the clip does not allow it.
     """
     reader = VideoReader(clip)
     try:
-        probe_path = options.probe or find_sidecar(clip, "probe")
-        if probe_path is None:
-            raise ProbeError(f"{clip}: no probe.json beside it; give the one that `arlight probe` wrote: --probe FILE")
+        probe_path = _probe_path(clip, options)
+        probe, camera, notes = sheet_and_camera(clip, options)
+        assembly, vignetting, calibrated = _calibration(clip, options, probe, camera)
+        if any(vignetting):
+            own = np.array(camera.vignetting or (0.0, 0.0, 0.0)) + vignetting
+            camera = replace(camera, vignetting=(float(own[0]), float(own[1]), float(own[2])))
         camera_path = options.camera or find_sidecar(clip, "camera")
+        return Footage(reader, probe, camera, probe_path, camera_path, assembly, (*notes, *calibrated))
+    except BaseException:
+        reader.close()
+        raise
+
+
+def sheet_and_camera(clip: Path, options: SheetAndCamera) -> tuple[Probe, Camera, tuple[str, ...]]:
+    """The sheet and the camera of a clip, and what to tell the user about them; raises as `open_footage`."""
+    probe = load_probe(_probe_path(clip, options))
+    camera_path = options.camera or find_sidecar(clip, "camera")
+    with VideoReader(clip) as reader:
         if camera_path is None:
-            raise CameraError(
-                f"{clip}: no camera.json beside it; give the intrinsics of the camera that filmed it (image_size, "
-                "camera_matrix, distortion as OpenCV's calibration reports them): --camera FILE"
-            )
-        probe, camera = load_probe(probe_path), Camera.load(camera_path)
+            estimate = estimate_camera(reader, probe)
+            return probe, estimate.camera, (f"{clip}: {estimate.summary}",)
+        camera = Camera.load(camera_path)
         if camera.image_size != reader.size:
             raise CameraError(
                 f"{camera_path}: is for pictures of {_size(camera.image_size)}, {clip} has {_size(reader.size)}; give "
                 "the camera.json of this footage (--camera FILE)"
             )
-        return Footage(reader, probe, camera, probe_path, camera_path)
-    except BaseException:
-        reader.close()
-        raise
+    return probe, camera, ()
+
+
+def _probe_path(clip: Path, options: SheetAndCamera) -> Path:
+    path = options.probe or find_sidecar(clip, "probe")
+    if path is None:
+        raise ProbeError(f"{clip}: no probe.json beside it; give the one that `arlight probe` wrote: --probe FILE")
+    return path
+
+
+def _calibration(
+    clip: Path, options: FootageOptions, probe: Probe, camera: Camera
+) -> tuple[Assembly | None, tuple[float, float, float], tuple[str, ...]]:
+    """The assembled sheet, the vignetting found with it, and what to tell the user."""
+    if options.self_calibrate:
+        if options.calibration is not None:
+            raise CalibrationError(
+                f"{options.calibration}: --self-calibrate makes a calibration of its own; leave one of them out"
+            )
+        found = self_calibrate_clip(clip, probe, camera)
+        note = f"{clip}: sheet calibrated on {found.views} views (residual chi-square {found.chi2:.2f})"
+        return found.assembly, found.vignetting, (note,)
+    path = options.calibration or find_sidecar(clip, "calibration")
+    if path is None:
+        return None, (0.0, 0.0, 0.0), ()
+    return load_assembly(path, len(field_blocks(probe))), load_vignetting(path), (f"sheet as in {path}",)
 
 
 def check_result(footage: Footage, statistics: RunStatistics) -> None:

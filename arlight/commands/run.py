@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import tyro
+from rich.console import Console
 
 from arlight.commands.encoding import EncodingOptions
 from arlight.commands.footage import Footage, FootageOptions, check_result, open_footage, shows_the_sheet
@@ -59,6 +60,9 @@ def run(options: RunOptions) -> int:
     with open_footage(options.clip, options.footage) as footage:
         _check_order(options.order, footage)
         outputs = _prepare(options, footage)
+        console = Console(soft_wrap=True, highlight=False, markup=False)
+        for note in footage.notes:
+            console.print(note)
         pipeline = _pipeline(options, footage)
         statistics = RunStatistics()
         try:
@@ -90,14 +94,15 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
         lighting = Path(f"{options.clip.stem}.jsonl")
     if output is not None:
         check_output(output, [])
-    inputs = [options.clip, footage.probe_path, footage.camera_path, options.relighting.object]
+    inputs = [options.clip, footage.probe_path, footage.camera_path, options.footage.calibration]
+    inputs.append(options.relighting.object)
     return prepare_outputs({"--output": output, "--lighting": lighting, "--report": options.report}, inputs)
 
 
 def _pipeline(options: RunOptions, footage: Footage) -> Pipeline:
     probe, camera, order = footage.probe, footage.camera, options.order
     relighter = make_relighter(options.relighting, probe, camera, order) if options.render else None
-    return Pipeline(probe, camera, relighter, TrackerSettings(order=order))
+    return Pipeline(probe, camera, relighter, TrackerSettings(order=order), footage.assembly)
 
 
 def _process(

@@ -17,17 +17,24 @@ VERSION = 1
 _LARGEST_SHIFT_MM = 50.0
 
 
-def save_assembly(assembly: Assembly, path: Path | str, stddev: Mapping[str, float] | None = None) -> None:
+def save_assembly(
+    assembly: Assembly,
+    path: Path | str,
+    stddev: Mapping[str, float] | None = None,
+    vignetting: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> None:
     """Write a calibration; reading it back gives an equal assembly.
 
     Args:
         stddev: standard deviations to note beside the values, by the calibration's parameter names.
+        vignetting: what the calibration found beside the vignetting of the camera's own file.
 
     Raises:
         OutputError: the file cannot be written.
     """
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION, "glass_scale": assembly.glass_scale}
     content |= {"film": _print_content(assembly.film), "paper": _print_content(assembly.paper)}
+    content["vignetting"] = list(vignetting)
     if assembly.blocks is not None:
         content["blocks"] = {name: list(map(float, getattr(assembly.blocks, name))) for name in _BLOCK_RANGES}
     if stddev is not None:
@@ -61,6 +68,19 @@ def load_assembly(path: Path | str, block_count: int) -> Assembly:
         if str(error).startswith(str(path)):
             raise
         raise ProbeError(f"{path}: {error}") from error
+
+
+def load_vignetting(path: Path | str) -> tuple[float, float, float]:
+    """The vignetting that a calibration found beside the camera's own.
+
+    Raises:
+        ProbeError: as for `load_assembly`.
+    """
+    content = Field.read(Path(path))
+    if not content.has("vignetting"):
+        return 0.0, 0.0, 0.0
+    k1, k2, k3 = (item.number(-2.0, 2.0) for item in content.at("vignetting").items(3))
+    return k1, k2, k3
 
 
 _BLOCK_RANGES = {"gain": (0.1, 10.0), "offset": (-1.0, 1.0), "modulation": (-10.0, 10.0), "phase_deg": (-360.0, 360.0)}

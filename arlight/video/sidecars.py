@@ -4,7 +4,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-SidecarKind = Literal["probe", "camera", "truth"]
+SidecarKind = Literal["probe", "camera", "calibration", "truth"]
 
 
 def find_sidecar(clip: str | PathLike[str], kind: SidecarKind) -> Path | None:
@@ -14,7 +14,7 @@ def find_sidecar(clip: str | PathLike[str], kind: SidecarKind) -> Path | None:
 
     Args:
         clip: the video; it need not exist.
-        kind: `probe`, `camera` or `truth`; a truth is only ever for one clip.
+        kind: `probe`, `camera`, `calibration` or `truth`; a truth is only ever for one clip.
     """
     clip = Path(clip)
     own, shared = clip.with_name(f"{clip.stem}.{kind}.json"), clip.with_name(f"{kind}.json")
