@@ -7,7 +7,7 @@ from arlight.calibration.paper_samples import PaperSampler, PaperSamples
 from arlight.calibration.response_curve import ResponseFit, fit_response, patches_of
 from arlight.calibration.sensor_noise import clipping_level, fit_noise
 from arlight.camera import Camera
-from arlight.errors import CameraError
+from arlight.errors import CalibrationError
 from arlight.probe.design import Probe
 from arlight.radiometry import Radiometry
 from arlight.tracking.luma import luma_codes
@@ -39,7 +39,7 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
         stride: one of so many frames is used, up to twelve.
 
     Raises:
-        CameraError: the sheet is not seen, or the pictures do not determine the curve.
+        CalibrationError: the sheet is not seen, or the pictures do not determine the curve.
     """
     plain = replace(camera, radiometry=None)
     tracker, sampler = PoseTracker(probe, plain), PaperSampler(probe, plain)
@@ -49,7 +49,7 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
         if number % stride:
             continue
         if used and frame.format != used[0].format:
-            raise CameraError(
+            raise CalibrationError(
                 f"the pictures must be encoded alike, found {used[0].format} and {frame.format}; give one camera's, at "
                 "one setting"
             )
@@ -63,7 +63,7 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
         if len(used) >= MOST_FRAMES:
             break
     if not used:
-        raise CameraError(
+        raise CalibrationError(
             "the camera's response cannot be measured: no picture shows the sheet; film its whole frame, sharp, and "
             "give its probe.json (--probe FILE)"
         )

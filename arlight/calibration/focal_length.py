@@ -4,15 +4,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from arlight.calibration.camera_fit import CameraFit, Expectation, TargetView, fit_camera
+from arlight.calibration.camera_fit import CameraFit, Expectation
 from arlight.calibration.marker_points import MarkerPoints
-from arlight.calibration.view_selection import edge_sharpness, select_views
+from arlight.calibration.sheet_pictures import TargetPicture, fit_sheet
+from arlight.calibration.view_selection import select_views
 from arlight.camera import Camera
-from arlight.errors import CameraError
+from arlight.errors import CalibrationError
 from arlight.probe.design import Probe
-from arlight.tracking.luma import luma_codes
 from arlight.video.frame import Frame
 from arlight.video.reader import VideoReader
 
@@ -21,8 +20,6 @@ _SEARCHED = 20
 _FIRST_FRAMES = 240
 """Frames of a long clip over which the pictures are spread, counted from where the sheet appears."""
 _MOST_VIEWS = 12
-_PASSES = 2
-"""Alignments, each under the intrinsics of the one before."""
 WORST_FOCAL_STDDEV = 0.02
 """Standard deviation of the focal length, relative to it, beyond which it is not determined."""
 _TYPICAL_TILT_DEG = 15.0
@@ -51,17 +48,6 @@ class CameraEstimate:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _Candidate:
-    """A picture in which the sheet was found."""
-
-    view: TargetView
-    index: int
-    luma: NDArray[np.uint8]
-    table: NDArray[np.float32]
-    sharpness: float
-
-
 def estimate_camera(
     frames: VideoReader | Iterable[Frame], probe: Probe, frame_count: int | None = None, pixel_aspect: float = 1.0
 ) -> CameraEstimate:
@@ -79,7 +65,7 @@ def estimate_camera(
         pixel_aspect: width of a pixel relative to its height; a reader says so itself.
 
     Raises:
-        CameraError: the sheet was not found, or its views do not determine the focal length.
+        CalibrationError: the sheet was not found, or its views do not determine the focal length.
     """
     if isinstance(frames, VideoReader):
         frame_count = frames.frame_count if frame_count is None else frame_count
@@ -87,57 +73,35 @@ def estimate_camera(
     points = MarkerPoints(probe)
     found = _candidates(frames, points, frame_count)
     if not found:
-        raise CameraError(
+        raise CalibrationError(
             "the camera cannot be estimated from the clip: no frame shows four of the sheet's markers; give the "
             "camera that filmed it (--camera FILE; `arlight calibrate camera` makes one), and check --probe"
         )
-    size = (found[0].luma.shape[1], found[0].luma.shape[0])
-    kept = select_views([c.view for c in found], [c.sharpness for c in found], size, _MOST_VIEWS)
+    size = found[0].size
+    kept = select_views([p.view for p in found], [p.sharpness for p in found], size, _MOST_VIEWS)
     chosen = [found[k] for k in kept]
-    fit = _fitted(chosen, points, size, Expectation.of_footage(size, pixel_aspect))
-    return CameraEstimate(fit.camera, fit.focal_stddev, fit.stddev_px, tuple(c.index for c in chosen))
+    fit = fit_sheet(chosen, points, Expectation.of_footage(size, pixel_aspect))
+    if fit is None or not fit.focal_stddev < WORST_FOCAL_STDDEV:
+        raise _undetermined(fit)
+    return CameraEstimate(fit.camera, fit.focal_stddev, fit.stddev_px, tuple(p.index for p in chosen))
 
 
-def _candidates(frames: Iterable[Frame], points: MarkerPoints, frame_count: int | None) -> list[_Candidate]:
+def _candidates(frames: Iterable[Frame], points: MarkerPoints, frame_count: int | None) -> list[TargetPicture]:
     """Pictures in which the sheet was found, evenly apart in time."""
     stride = max(1, min(frame_count or _FIRST_FRAMES, _FIRST_FRAMES) // _SEARCHED)
-    found: list[_Candidate] = []
+    found: list[TargetPicture] = []
     for number, frame in enumerate(frames):
         if number % stride:
             continue
-        codes, table = luma_codes(frame)
-        view = points.detect(codes, str(frame.index))
-        if view is not None:
-            sharpness = edge_sharpness(codes, view.pixels)
-            found.append(_Candidate(view, frame.index, np.array(codes), table, sharpness))
+        picture = TargetPicture.of_sheet(frame, points, str(frame.index))
+        if picture is not None:
+            found.append(picture)
         if len(found) >= _SEARCHED:
             break
     return found
 
 
-def _fitted(chosen: list[_Candidate], points: MarkerPoints, size: tuple[int, int], expected: Expectation) -> CameraFit:
-    """Adjusted, aligned and adjusted again.
-
-    Raises:
-        CameraError: the views do not determine the focal length.
-    """
-    fit = fit_camera([c.view for c in chosen], size, expected)
-    for _ in range(_PASSES):
-        if fit is None:
-            break
-        aligned = [
-            points.align(c.luma, c.table, fit.camera, pose, c.view.name)
-            for c, pose in zip(chosen, fit.poses, strict=True)
-        ]
-        # a view that cannot be aligned keeps ArUco's points rather than leave the rest without its perspective
-        views = [fine or c.view for fine, c in zip(aligned, chosen, strict=True)]
-        fit = fit_camera(views, size, expected, fit.camera)
-    if fit is None or not fit.focal_stddev < WORST_FOCAL_STDDEV:
-        raise _undetermined(fit)
-    return fit
-
-
-def _undetermined(fit: CameraFit | None) -> CameraError:
+def _undetermined(fit: CameraFit | None) -> CalibrationError:
     if fit is None:
         found = "no camera explains where its markers are seen"
     else:
@@ -147,7 +111,7 @@ def _undetermined(fit: CameraFit | None) -> CameraError:
             found += f", the sheet is seen from straight above (at most {max(tilts):.0f} degrees off)"
         else:
             found += f", from {len(fit.poses)} distinct view{'s' if len(fit.poses) > 1 else ''}"
-    return CameraError(
+    return CalibrationError(
         f"the focal length cannot be estimated from the clip: {found}; film the sheet large in the picture and from 30 "
         "to 55 degrees off its normal while the camera moves around it, or give the camera (--camera FILE; `arlight "
         "calibrate camera` makes one)"

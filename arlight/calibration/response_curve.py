@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from arlight.calibration.paper_samples import PaperSamples
 from arlight.color import Transfer, linear_from_encoded
-from arlight.errors import CameraError
+from arlight.errors import CalibrationError
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def fit_response(patches: Sequence[Patch], transfer: Transfer, half_sheet_mm: fl
         half_sheet_mm: half the sheet's longer side [mm].
 
     Raises:
-        CameraError: too few steps are seen, white is too dark, or no rising curve explains the steps.
+        CalibrationError: too few steps are seen, white is too dark, or no rising curve explains the steps.
     """
     groups = _usable(patches)
     encoded = np.concatenate([[patch.encoded for patch in group] for group in groups])
@@ -118,7 +118,7 @@ def fit_response(patches: Sequence[Patch], transfer: Transfer, half_sheet_mm: fl
     covariance = np.linalg.inv(found.jac.T @ found.jac)
     response = _signal(np.linspace(0.0, 1.0, KNOTS), found.x[:-1], transfer)
     if not np.all(np.diff(response) > 0.0):
-        raise CameraError(
+        raise CalibrationError(
             "the camera's response cannot be measured: no rising curve explains the grey wedge's steps; check that the "
             "probe.json is this sheet's, that no shadow or reflection lies on a part of the frame, and film it brighter"
         )
@@ -143,7 +143,7 @@ def _usable(patches: Sequence[Patch]) -> list[list[Patch]]:
     """Patches by group, of groups with enough of the wedge.
 
     Raises:
-        CameraError: no group has.
+        CalibrationError: no group has.
     """
     by_group: dict[int, list[Patch]] = {}
     for patch in patches:
@@ -151,14 +151,14 @@ def _usable(patches: Sequence[Patch]) -> list[list[Patch]]:
     steps = {number: len({p.reflectance for p in group if p.reflectance < 0.999}) for number, group in by_group.items()}
     groups = [group for number, group in sorted(by_group.items()) if steps[number] >= _FEWEST_STEPS]
     if not groups:
-        raise CameraError(
+        raise CalibrationError(
             f"the camera's response cannot be measured: at least {_FEWEST_STEPS} steps of the grey wedge must be seen "
             f"unclipped in a picture, found {max(steps.values(), default=0)}; film the whole frame of the sheet, large "
             "in the picture, without clipping white"
         )
     brightest = max(patch.encoded for group in groups for patch in group)
     if brightest < _LEAST_WHITE:
-        raise CameraError(
+        raise CalibrationError(
             f"the camera's response cannot be measured: white paper reaches {100.0 * brightest:.0f} % of full scale, "
             f"at least {100.0 * _LEAST_WHITE:.0f} % are needed; film the sheet in brighter light or expose longer"
         )
