@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 
 from arlight.calibration.block_corrections import MODEL, CorrectionPrior
 from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.known_lighting_model import VIEW_STDDEV, Linearisation, Unknowns
-from arlight.calibration.known_lighting_parameters import EXPECTED, PARAMETERS, STDDEV, within_limits
+from arlight.calibration.known_lighting_model import (
+    EXPECTED,
+    LAYER_STDDEV,
+    LOW,
+    NAMES,
+    VIEW_STDDEV,
+    Linearisation,
+    Unknowns,
+)
 from arlight.calibration.known_lighting_views import LitView
 from arlight.calibration.known_lighting_weights import RowModel
 from arlight.probe.design import Probe
@@ -108,7 +115,7 @@ class KnownLightingFit:
         """One step; returns the unknowns after it and its length in prior standard deviations of the layers."""
         normal = self.normal(unknowns, views, highest_order, tolerance)
         change, _ = normal.solve()
-        length = float(np.max(np.abs(change[: len(PARAMETERS)]) / STDDEV))
+        length = float(np.max(np.abs(change[: len(NAMES)]) / LAYER_STDDEV))
         return self.moved(unknowns, change * min(1.0, _LONGEST_STEP / max(length, 1e-12))), length
 
     def normal(
@@ -130,11 +137,11 @@ class KnownLightingFit:
             for channel in range(3):
                 design, index = shared[:, :, channel], at
                 if self._relative:
-                    slope = prediction.rows[:, :, channel, None] / unknowns.exposures[view.lighting, channel]
+                    slope = prediction.rows[:, :, channel, None] / unknowns.exposures[view.sheet.light, channel]
                     design = np.concatenate([design, slope], axis=2)
-                    index = np.append(at, places.exposure(view.lighting).start + channel)
+                    index = np.append(at, places.exposure(view.sheet.light).start + channel)
                 _add(
-                    matrices[view.lighting], right[view.lighting], places.first_block, index, design,
+                    matrices[view.sheet.light], right[view.sheet.light], places.first_block, index, design,
                     single[:, :, channel], weighted.precision[channel], weighted.residual[..., channel],
                 )  # fmt: skip
         inverse_variance, pull = self._priors(unknowns, views, places)
@@ -150,7 +157,7 @@ class KnownLightingFit:
             factor = change[places.layers : places.view(0).start].reshape(exposures.shape)
             exposures = np.maximum(exposures + factor, 0.1 * exposures)
         return Unknowns(
-            layers=within_limits(unknowns.layers + change[: places.layers]),
+            layers=np.maximum(unknowns.layers + change[: places.layers], LOW),
             blocks=unknowns.blocks + change[places.first_block :].reshape(unknowns.blocks.shape),
             views=own,
             exposures=exposures,
@@ -158,14 +165,14 @@ class KnownLightingFit:
 
     def _places(self, unknowns: Unknowns) -> Places:
         lightings = len(self._lights) if self._relative else 0
-        return Places(len(PARAMETERS), lightings, len(unknowns.views), len(unknowns.blocks))
+        return Places(len(NAMES), lightings, len(unknowns.views), len(unknowns.blocks))
 
     def _priors(self, unknowns: Unknowns, views: list[LitView], places: Places) -> tuple[Array, Array]:
         """Inverse variances (u,) and their pull toward the expected values."""
         usual = np.zeros_like(unknowns.views)
-        usual[:, 0] = [view.blur_px**2 for view in views]
+        usual[:, 0] = [view.sheet.blur_px**2 for view in views]
         away = [EXPECTED - unknowns.layers, (usual - unknowns.views).ravel(), (MODEL - unknowns.blocks).ravel()]
-        stddev = [STDDEV, np.tile(VIEW_STDDEV, len(views)), np.tile(self._prior.stddev, places.blocks)]
+        stddev = [LAYER_STDDEV, np.tile(VIEW_STDDEV, len(views)), np.tile(self._prior.stddev, places.blocks)]
         if self._relative:
             # about the start, which the pictures gave: only a guard against lights that were never seen
             away.insert(1, np.zeros(3 * places.lightings))

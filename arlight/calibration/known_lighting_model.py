@@ -1,22 +1,37 @@
 """What the blocks show under known light, for a trial assembly, and how it changes with every unknown."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.calibration import layer_parameters
 from arlight.calibration.block_corrections import STEPS as BLOCK_STEPS
 from arlight.calibration.block_corrections import with_corrections
 from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.known_lighting_parameters import LOWER_FACE, PARAMETERS, REFLECTANCE, assembly_of
-from arlight.calibration.known_lighting_parameters import STEPS as LAYER_STEPS
-from arlight.calibration.known_lighting_views import LitView, SheetGeometry, turned_rows
+from arlight.calibration.known_lighting_views import LitView
+from arlight.calibration.sheet_view import PredictedSheet, SheetView
 from arlight.estimation.resampling import measured_frequencies
-from arlight.estimation.response import BlockResponse, optical_transfer
+from arlight.estimation.response import optical_transfer
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
+from arlight.tracking.block_layout import BlockLayout
+from arlight.tracking.block_means import HARMONICS
 
 Array = NDArray[np.float64]
+
+NAMES = (*layer_parameters.NAMES, "reflectance")
+"""Parameters of the layers and the camera, in the order of their vector; the last is a factor on all that paper and
+film send back, which known light tells and unknown light does not."""
+EXPECTED = np.append(layer_parameters.EXPECTED, 1.0)
+LOW = np.append(layer_parameters.LOW, 0.2)
+LAYER_STEPS = np.append(layer_parameters.STEP, 1e-3)
+LAYER_STDDEV = np.append(layer_parameters.STDDEV, 0.15)
+# light that is not quite distant differs from light to light, and a gain that falls across the sheet is the blocks'
+LAYER_STDDEV[[NAMES.index("gradient_x"), NAMES.index("gradient_y")]] = 1e-6
+_VIGNETTING = (NAMES.index("vignetting_k1"), NAMES.index("vignetting_k2"))
+_LOWER_FACE = NAMES.index("lower_face")
 
 VIEW_STEPS = np.array([1e-3, 1e-4, 1e-4, 1e-4, 1e-4])
 """Steps of a view's unknowns."""
@@ -30,7 +45,7 @@ class Unknowns:
     """A trial of everything that is estimated."""
 
     layers: Array
-    """Values of `PARAMETERS`."""
+    """Values of `NAMES`."""
     blocks: Array
     """(blocks, 4) corrections."""
     views: Array
@@ -41,83 +56,87 @@ class Unknowns:
     @property
     def assembly(self) -> Assembly:
         """The sheet that they describe."""
-        return with_corrections(assembly_of(self.layers), self.blocks, float(self.layers[REFLECTANCE]))
+        layers = layer_parameters.assembly_of(self.layers[:-1])
+        return with_corrections(layers, self.blocks, float(self.layers[-1]))
+
+    @property
+    def vignetting(self) -> tuple[float, float]:
+        """Radial gain of the lens beside what the camera already has."""
+        first, second = (float(self.layers[place]) for place in _VIGNETTING)
+        return first, second
 
 
 @dataclass(frozen=True, slots=True)
 class ViewPrediction:
-    """What one view should show; errors of it are linear in small changes of the unknowns."""
+    """What one view should show."""
 
-    lit: Array
-    """(blocks, 7, 3) rows of the light, blur included."""
+    rows: Array
+    """(blocks, 7, 3) light and mirror reflection together, blur included."""
     mirror: Array
     """(blocks, 7) rows of a mirror reflection of 1 in the upper face."""
     mirrored: Array
     """(blocks, 3) mirror reflection that the environment predicts."""
 
-    @property
-    def rows(self) -> Array:
-        """(blocks, 7, 3) light and mirror reflection together."""
-        return self.lit + self.mirror[..., None] * self.mirrored[:, None]
-
 
 class SheetModel:
     """One trial assembly under the known lights."""
 
-    def __init__(self, probe: Probe, lights: list[KnownLight], unknowns: Unknowns) -> None:
+    def __init__(self, probe: Probe, lights: Sequence[KnownLight], unknowns: Unknowns) -> None:
         """Solve the stack, and take the lights' coefficients at the frequencies that it measures."""
         assembly = unknowns.assembly
-        self._response = BlockResponse(probe, assembly)
-        self._geometry = SheetGeometry.of(probe, assembly)
-        self._lower_face = float(unknowns.layers[LOWER_FACE])
-        self._index = probe.refractive_index
+        self._sheet = PredictedSheet(probe, assembly)
+        self._cycles = BlockLayout.of_probe(probe, assembly).cycles_per_mm
+        self._tilted_mm = assembly.slab(probe).glass_mm / probe.refractive_index
+        self._lower_face = float(unknowns.layers[_LOWER_FACE])
+        self._vignetting = unknowns.vignetting
         frequencies = measured_frequencies(probe, assembly)
-        self._coefficients = [light.packed(frequencies)[self._response.places] for light in lights]
+        self._coefficients = [light.packed(frequencies)[self._sheet.response.places] for light in lights]
 
     def predict(self, view: LitView, own: Array, exposure: Array) -> ViewPrediction:
         """Rows of a view.
 
         Args:
-            view: its geometry; the values are not read.
+            view: its geometry; the measured values are not read.
             own: (5,) unknowns of the view.
             exposure: (3,) factor on the light's radiance.
         """
-        geometry = self._geometry
-        toward = view.toward + own[3:5] / self._index
-        seen = replace(view, toward=toward).in_phase(geometry.film_phase, geometry.view_phase(toward)).means
-        transfer = optical_transfer(seen.cycles_per_px, float(own[0]))
-        light = self._coefficients[view.lighting] * exposure
-        lit = np.einsum("brk,bkc->brc", self._response.light(seen), light) * transfer[..., None]
-        mirror = self._lower_face * self._response.lower_mirror(seen) * transfer
-        turn = geometry.film_phase - view.film_phase + 2.0 * np.pi * geometry.cycles_per_mm @ own[1:3]
-        mirror = turned_rows(mirror, turn)
+        rows, lower = self._sheet.rows(self._turned(view.sheet, own[3:5]))
+        transfer = optical_transfer(view.sheet.means.cycles_per_px, float(own[0]))
+        light = self._coefficients[view.sheet.light] * exposure
+        mirror = self._lower_face * lower * transfer
         mirror[:, 0] += 1.0
-        return ViewPrediction(turned_rows(lit, turn), mirror, view.mirrored * exposure)
+        mirrored = view.mirrored * exposure
+        shown = np.einsum("brk,bkc->brc", rows, light) * transfer[..., None] + mirror[..., None] * mirrored[:, None]
+        squared = view.sheet.radius_squared
+        gain = 1.0 + squared * (self._vignetting[0] + squared * self._vignetting[1])
+        shown = turned_rows(shown, 2.0 * np.pi * self._cycles @ own[1:3]) * gain[:, None, None]
+        return ViewPrediction(shown, mirror * gain[:, None], mirrored)
+
+    def _turned(self, sheet: SheetView, tilt: Array) -> SheetView:
+        """The view from a slightly other direction."""
+        if not np.any(tilt):
+            return sheet
+        turn = np.exp(-2j * np.pi * self._tilted_mm * (self._cycles @ tilt))
+        return replace(sheet, means=replace(sheet.means, view_phasor=sheet.means.view_phasor * turn))
 
 
 class Linearisation:
     """Predictions about a trial, with one-sided differences; everything that views share is prepared once."""
 
-    def __init__(self, probe: Probe, lights: list[KnownLight], unknowns: Unknowns) -> None:
+    def __init__(self, probe: Probe, lights: Sequence[KnownLight], unknowns: Unknowns) -> None:
         self._at = unknowns
         self._model = SheetModel(probe, lights, unknowns)
         layers, blocks = unknowns.layers, unknowns.blocks
-        # steps lead away from the limits
-        self._layer_steps = np.array(
-            [-s if v + s > p.high else s for v, s, p in zip(layers, LAYER_STEPS, PARAMETERS, strict=True)]
-        )
         self._layers = [
-            SheetModel(probe, lights, replace(unknowns, layers=layers + step * unit))
-            for step, unit in zip(self._layer_steps, np.eye(len(layers)), strict=True)
+            SheetModel(probe, lights, replace(unknowns, layers=layers + change)) for change in np.diag(LAYER_STEPS)
         ]
         self._blocks = [
-            SheetModel(probe, lights, replace(unknowns, blocks=blocks + step * unit))
-            for step, unit in zip(BLOCK_STEPS, np.eye(blocks.shape[1]), strict=True)
+            SheetModel(probe, lights, replace(unknowns, blocks=blocks + change)) for change in np.diag(BLOCK_STEPS)
         ]
 
     def predict(self, view: LitView, number: int) -> ViewPrediction:
         """Prediction of the view of that number."""
-        return self._model.predict(view, self._at.views[number], self._at.exposures[view.lighting])
+        return self._model.predict(view, self._at.views[number], self._at.exposures[view.sheet.light])
 
     def differences(self, view: LitView, number: int) -> tuple[Array, Array]:
         """How the rows change.
@@ -126,16 +145,28 @@ class Linearisation:
             (blocks, 7, 3, p): with the layers' parameters, then the view's unknowns;
             (blocks, 7, 3, 4): with the block's own corrections.
         """
-        own, exposure = self._at.views[number], self._at.exposures[view.lighting]
+        own, exposure = self._at.views[number], self._at.exposures[view.sheet.light]
         base = self.predict(view, number).rows
-        shared = [
-            (model.predict(view, own, exposure).rows - base) / step
-            for model, step in zip(self._layers, self._layer_steps, strict=True)
-        ]
-        for step, unit in zip(VIEW_STEPS, np.eye(len(VIEW_STEPS)), strict=True):
-            shared.append((self._model.predict(view, own + step * unit, exposure).rows - base) / step)
-        single = [
-            (model.predict(view, own, exposure).rows - base) / step
-            for model, step in zip(self._blocks, BLOCK_STEPS, strict=True)
-        ]
-        return np.stack(shared, axis=-1), np.stack(single, axis=-1)
+
+        def slopes(models: list[SheetModel], steps: Array) -> list[Array]:
+            return [
+                (model.predict(view, own, exposure).rows - base) / step
+                for model, step in zip(models, steps, strict=True)
+            ]
+
+        shared = slopes(self._layers, LAYER_STEPS)
+        for change, step in zip(np.diag(VIEW_STEPS), VIEW_STEPS, strict=True):
+            shared.append((self._model.predict(view, own + change, exposure).rows - base) / step)
+        return np.stack(shared, axis=-1), np.stack(slopes(self._blocks, BLOCK_STEPS), axis=-1)
+
+
+def turned_rows(rows: Array, turn: Array) -> Array:
+    """Rows (blocks, 7, ...) of stripes whose phase is ahead by `turn` (blocks,) of the phase they are told in [rad]."""
+    out = rows.copy()
+    shape = (-1,) + (1,) * (rows.ndim - 2)
+    for m in range(1, HARMONICS + 1):
+        cosine, sine = (wave(m * turn).reshape(shape) for wave in (np.cos, np.sin))
+        even, odd = rows[:, 2 * m - 1], rows[:, 2 * m]
+        out[:, 2 * m - 1] = even * cosine + odd * sine
+        out[:, 2 * m] = odd * cosine - even * sine
+    return out

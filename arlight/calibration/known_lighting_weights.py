@@ -54,7 +54,7 @@ class RowModel:
 
     def weigh(self, view: LitView, prediction: ViewPrediction, blur_variance_px2: float) -> WeightedView:
         """Residuals and precision of a view's rows."""
-        means = view.means
+        means = view.sheet.means
         residual = means.values - prediction.rows
         transfer = optical_transfer(means.cycles_per_px, blur_variance_px2)
         usable = self._usable(view, transfer)
@@ -76,22 +76,22 @@ class RowModel:
     def _usable(self, view: LitView, transfer: Array) -> NDArray[np.bool_]:
         order = np.repeat(np.arange(1, transfer.shape[1] // 2 + 1), 2)
         usable = np.ones(transfer.shape, bool)
-        usable[:, 1:] = (order <= view.means.harmonics[:, None]) & (transfer[:, 1:] > _WEAKEST_TRANSFER)
-        return usable & (view.means.valid & (self.order <= self.highest_order))[:, None]
+        usable[:, 1:] = (order <= view.sheet.means.harmonics[:, None]) & (transfer[:, 1:] > _WEAKEST_TRANSFER)
+        return usable & (view.sheet.means.valid & (self.order <= self.highest_order))[:, None]
 
     def _extra(self, view: LitView, prediction: ViewPrediction, channel: int, level: float) -> Array:
         """(blocks,) variance of what a block mirrors beside the prediction; wider where the mean shows a lamp."""
-        uneven = np.maximum(view.means.shading[:, channel] - _EVEN * level, 0.0)
+        uneven = np.maximum(view.sheet.means.shading[:, channel] - _EVEN * level, 0.0)
         usual = (_SPARKLE * level) ** 2 + (_TO_SHADING * uneven) ** 2
         usual = usual + (_OF_PREDICTED * prediction.mirrored[:, channel]) ** 2
-        mean = view.means.values[:, 0, channel] - prediction.rows[:, 0, channel]
+        mean = view.sheet.means.values[:, 0, channel] - prediction.rows[:, 0, channel]
         strayed = np.maximum(np.abs(mean) - 0.02 * level - self.tolerance * level, 0.0)
         return np.asarray(usual + strayed**2, float)
 
 
 def white_level(view: LitView, white: NDArray[np.bool_]) -> Array:
     """(3,) radiance of clear film on white paper; from all blocks where no white is seen."""
-    means = view.means
+    means = view.sheet.means
     seen = means.values[white & means.valid, 0]
     if len(seen):
         return np.asarray(np.maximum(np.median(seen, axis=0), 1e-3), float)
