@@ -4,6 +4,7 @@ The lights are known, so nothing of them is solved for. Stripes of low orders le
 millimetre aside puts the finest stripes off by more than half a cycle.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,7 +94,7 @@ class KnownLightingFit:
     """Fits a sheet to views under known light."""
 
     def __init__(
-        self, probe: Probe, lights: list[KnownLight], rows: RowModel, prior: CorrectionPrior, relative: bool
+        self, probe: Probe, lights: Sequence[KnownLight], rows: RowModel, prior: CorrectionPrior, relative: bool
     ) -> None:
         """
         Args:
@@ -106,7 +107,8 @@ class KnownLightingFit:
         self._probe = probe
         self._lights = lights
         self._rows = rows
-        self._prior = prior
+        self.prior = prior
+        """How far blocks stray from the layers' model."""
         self._relative = relative
 
     def step(
@@ -172,7 +174,7 @@ class KnownLightingFit:
         usual = np.zeros_like(unknowns.views)
         usual[:, 0] = [view.sheet.blur_px**2 for view in views]
         away = [EXPECTED - unknowns.layers, (usual - unknowns.views).ravel(), (MODEL - unknowns.blocks).ravel()]
-        stddev = [LAYER_STDDEV, np.tile(VIEW_STDDEV, len(views)), np.tile(self._prior.stddev, places.blocks)]
+        stddev = [LAYER_STDDEV, np.tile(VIEW_STDDEV, len(views)), np.tile(self.prior.stddev, places.blocks)]
         if self._relative:
             # about the start, which the pictures gave: only a guard against lights that were never seen
             away.insert(1, np.zeros(3 * places.lightings))
