@@ -1,8 +1,8 @@
 """Balls beside the sheet, traced ray by ray into a rendered picture: what a camera sees of a mirrored or a matte one.
 
-Every sample of a pixel meets the sphere by itself and carries back what the environment, or the table below the horizon,
-sends there. A ball rests on the table, hides part of the sky from it and mirrors what it darkened; its shadow on the sheet
-and the sheet's mirror image in it are left out, so that every probe meets the same light.
+Every sample of a pixel meets the sphere by itself and carries back what the environment, or the table below the
+horizon, sends there. A ball rests on the table, hides part of the sky from it and mirrors what it darkened; its shadow
+on the sheet and the sheet's mirror image in it are left out, so that every probe meets the same light.
 """
 
 from dataclasses import dataclass

@@ -25,7 +25,7 @@ _TRIALS = 600
 _SMOOTHING_PX = 0.7
 _CANDIDATES = 40
 _AS_GOOD = 0.85
-"""A larger circle is preferred over a better one's share of contour times this: a ball mirrors the horizon as a ring."""
+"""A larger circle with this share of the best one's contour is preferred: a ball mirrors the horizon as a ring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class FoundBall:
 
 
 def contrast_picture(radiance: NDArray[np.float32]) -> Picture:
-    """(h, w) logarithm of the luminance, slightly smoothed, scaled to 0 at the darkest and 1 at the brightest per cent."""
+    """(h, w) logarithm of the luminance, smoothed a little, 0 at the darkest and 1 at the brightest per cent."""
     luminance = radiance @ np.array([0.2126, 0.7152, 0.0722], np.float32)
     positive = luminance[luminance > 0.0]
     floor = float(np.percentile(positive, 5.0)) * 0.2 if positive.size else 1.0

@@ -72,11 +72,13 @@ def _slopes(picture: Picture, pixels: Array) -> tuple[Array, NDArray[np.bool_]]:
     if x1 - x0 < 3 or y1 - y0 < 3:
         return np.zeros(place.shape[:2]), np.zeros(place.shape[:2], bool)
     part = picture[y0:y1, x0:x1]
-    gradient = np.dstack([cv2.Scharr(part, cv2.CV_32F, 1, 0), cv2.Scharr(part, cv2.CV_32F, 0, 1)]) / 32.0
+    gradient: Picture = np.dstack([cv2.Scharr(part, cv2.CV_32F, 1, 0), cv2.Scharr(part, cv2.CV_32F, 0, 1)]).astype(
+        np.float32
+    )
     sampled = cv2.remap(
         gradient, place[..., 0] - np.float32(x0), place[..., 1] - np.float32(y0), cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT,
-    ).astype(float)  # fmt: skip
+    ).astype(float) / 32.0  # fmt: skip
     outward = np.gradient(pixels, axis=1)
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     along = np.abs(np.sum(sampled * outward, axis=2))

@@ -1,8 +1,8 @@
 """A ball as one camera sees it: the cone of rays that touch it, and what light each of its points reflects.
 
-A sphere's outline is a circular cone about the ray to its centre, so in the picture it is an ellipse, and a lens bends it
-further; among rays it stays exactly a cone. Which way light is reflected depends on the cone's angle alone: a small ball
-nearby and a large one far away show distant light in the same places.
+A sphere's outline is a circular cone about the ray to its centre, so in the picture it is an ellipse, and a lens bends
+it further; among rays it stays exactly a cone. Which way light is reflected depends on the cone's angle alone: a small
+ball nearby and a large one far away show distant light in the same places.
 """
 
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class BallOutline:
         q = q / np.linalg.norm(q, axis=1, keepdims=True)
         w = np.ones(len(q)) if weights is None else np.sqrt(np.asarray(weights, float))
         scaled = np.linalg.lstsq(q * w[:, None], w, rcond=None)[0]
-        length = np.linalg.norm(scaled)
+        length = float(np.linalg.norm(scaled))
         # noise can make a tiny cone's cosine exceed 1
-        return cls(scaled / length, float(np.arccos(min(1.0 / length, 1.0 - 1e-12))))
+        return cls(scaled / length, float(np.arccos(np.clip(1.0 / length, -1.0, 1.0 - 1e-12))))
 
     @classmethod
     def through_circle(cls, camera: Camera, center_px: ArrayLike, radius_px: float) -> "BallOutline":

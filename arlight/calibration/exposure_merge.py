@@ -6,6 +6,7 @@ counts clipped codes and darkens lamps with them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -61,23 +62,14 @@ def merge_exposures(
     response = np.repeat(linear.reshape(256, 1, 1), 3, axis=2)
     merged = np.asarray(cv2.createMergeRobertson().process(images, times=relative, response=response), np.float32)
     shortest, longest = images[0], images[-1]
-    clipped, black = shortest == 255, longest < _BLACK_CODE
+    clipped, black = np.asarray(shortest == 255), np.asarray(longest < _BLACK_CODE)
     merged = np.where(clipped, np.float32(1.0 / relative[0]), merged)
     # dark codes have hardly any weight, the darkest none
-    merged = np.where(longest < _BLACK_CODE, linear[longest] / relative[-1], merged)
+    merged = np.where(black, linear[longest] / relative[-1], merged)
     # no picture has a usable code: between two exposures too far apart
     lost = ~np.isfinite(merged) | ((merged <= 0.0) & ~black)
     merged = np.where(lost, linear[longest] / relative[-1], merged)
-    return MergedRadiance(merged.astype(np.float32), clipped.any(axis=-1), black.all(axis=-1))
-
-
-def aligned(photographs: Sequence[Photograph]) -> list[Photograph]:
-    """The pictures shifted onto each other by whole pixels (median threshold bitmaps), for brackets held in the hand."""
-    shifted: list[NDArray[np.uint8]] = [photograph.encoded.copy() for photograph in photographs]
-    if len(shifted) > 1:
-        _check_sizes(photographs)
-        cv2.createAlignMTB().process([photograph.encoded for photograph in photographs], shifted)
-    return [Photograph(p.name, image, p.exposure_s) for p, image in zip(photographs, shifted, strict=True)]
+    return MergedRadiance(merged.astype(np.float32), np.any(clipped, axis=-1), np.all(black, axis=-1))
 
 
 def _check_sizes(photographs: Sequence[Photograph]) -> None:
@@ -87,8 +79,8 @@ def _check_sizes(photographs: Sequence[Photograph]) -> None:
     for other in photographs[1:]:
         if other.encoded.shape != first.encoded.shape:
             raise PhotographError(
-                f"{other.name}: is {_size(other)}, {first.name} is {_size(first)}; pictures of one bracket must have one "
-                "size: give the camera's own files, neither cropped nor turned"
+                f"{other.name}: is {_size(other)}, {first.name} is {_size(first)}; pictures of one bracket must have "
+                "one size: give the camera's own files, neither cropped nor turned"
             )
 
 
@@ -100,8 +92,8 @@ def _check_exposures(photographs: Sequence[Photograph], exposures: NDArray[np.fl
             )
     if len(exposures) > 1 and exposures.max() < _LEAST_RATIO * exposures.min():
         raise PhotographError(
-            f"{len(exposures)} pictures have practically the same exposure, {exposures.min():g} to {exposures.max():g} s; "
-            "a bracket needs exposures that differ, such as 1/1000, 1/60 and 1/4 s; if they do, state them (--exposures)"
+            f"{len(exposures)} pictures have the same exposure, {exposures.min():g} to {exposures.max():g} s; a "
+            "bracket needs exposures that differ, such as 1/1000, 1/60 and 1/4 s; if they do, state them: --exposures S S ..."
         )
 
 
@@ -109,7 +101,7 @@ def _check_brightness(photographs: Sequence[Photograph], linear: NDArray[np.floa
     """Refuse exposures that the pictures' own brightness contradicts: wrong order, automatic gain."""
     ordered = sorted(photographs, key=lambda photograph: photograph.exposure_s)
     low, high = _USABLE_CODES
-    for shorter, longer in zip(ordered[:-1], ordered[1:], strict=True):
+    for shorter, longer in pairwise(ordered):
         dark, bright = shorter.encoded[::2, ::2], longer.encoded[::2, ::2]
         shared = (dark > low) & (dark < high) & (bright > low) & (bright < high)
         if np.count_nonzero(shared) < _FEWEST_SHARED:
@@ -118,7 +110,7 @@ def _check_brightness(photographs: Sequence[Photograph], linear: NDArray[np.floa
         stated = longer.exposure_s / shorter.exposure_s
         if not 1.0 / _GREATEST_DISAGREEMENT < ratio / stated < _GREATEST_DISAGREEMENT:
             raise PhotographError(
-                f"{longer.name} is {ratio:.2f} times as bright as {shorter.name}, their exposures say {stated:.2f} times; "
+                f"{longer.name} is {ratio:.2f} times as bright as {shorter.name}, their exposures say {stated:.2f}; "
                 "check the order of --exposures, and photograph with fixed sensitivity, aperture and tone curve"
             )
 

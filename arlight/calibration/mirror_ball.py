@@ -55,7 +55,7 @@ class BallLight:
     """The light that one or several pictures of a ball show."""
 
     radiance: NDArray[np.float32]
-    """(rows, 2 rows, 3) linear radiance, probe frame; where nothing was seen, what the ball's rim shows nearest to it."""
+    """(rows, 2 rows, 3) linear radiance, probe frame; where nothing was seen, what the rim shows nearest to it."""
     weight: NDArray[np.float32]
     """(rows, 2 rows) solid angle in the pictures per solid angle of light; 0 where nothing was seen."""
     clipped: NDArray[np.float32]

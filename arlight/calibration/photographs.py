@@ -105,8 +105,8 @@ def _exif_times(paths: list[Path], exposures: list[Exposure | None]) -> list[flo
     silent = [str(path) for path, exposure in zip(paths, exposures, strict=True) if exposure is None]
     if silent:
         raise PhotographError(
-            f"{', '.join(silent)}: no exposure time in EXIF; state the times of all {len(paths)} pictures in their order: "
-            "--exposures S S ..."
+            f"{', '.join(silent)}: no exposure time in EXIF; state the times of all {len(paths)} pictures "
+            "in their order: --exposures S S ..."
         )
     known = [exposure for exposure in exposures if exposure is not None]
     return [exposure.equivalent_s(known[0]) for exposure in known]
