@@ -1,7 +1,7 @@
 """The error per order that a printer and a glass allow, before anything is printed.
 
-Through A(view) at a typical view: what strays from A, the dots of the halftone, registration and dot gain that
-calibration leaves, and the camera's noise, goes through the weighted least squares that estimates the lighting.
+At a typical view, under natural light: what strays from A(view), which is the dots of the halftone and the registration
+and dot gain that calibration leaves, and the camera's noise, goes through the estimator that footage goes through.
 """
 
 from dataclasses import dataclass, replace
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from arlight.calibration.dot_response import dot_response_error
 from arlight.camera import Camera, Pose
 from arlight.estimation.bound import sensor_variance
+from arlight.estimation.estimator import LightingEstimator
 from arlight.estimation.prior import prior_stddev
 from arlight.estimation.reflection import reflection_basis
 from arlight.estimation.response import BlockResponse, optical_transfer
-from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL, row_variance
 from arlight.fourier import frequency_order
 from arlight.probe.assembly import Assembly, Print, Registration
 from arlight.probe.design import Probe
@@ -32,11 +32,8 @@ DOTS, REGISTRATION, DOT_GAIN, CAMERA = "dots", "registration", "dot gain", "came
 _PICTURE_PX = (1280, 720)
 _FOCAL_PX = 1100.0
 _GREEN = 1
-_WEAKEST_TRANSFER = 0.12
-"""Harmonics that blur has taken below this share are not used by the estimator either."""
-_FIELD = 0.004
-"""Standard deviation of the reflection field and of a block's own part of it, relative to white."""
-_SPARKLE = 0.0008
+_LIGHTS = 8
+"""Lights that are drawn: the predictions then repeat to within a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +52,8 @@ class Conditions:
     """Standard deviation of the sensor's noise in the dark."""
     gain: float = 3e-5
     """Variance of the shot noise per unit of signal."""
+    reflection: float = 0.004
+    """How uneven the mirror image of the surroundings is over the sheet, relative to white."""
     print_blur_mm: float = 0.04
     """Standard deviation by which ink and medium blur the print [mm]."""
     registration_mm: float = 0.002
@@ -94,42 +93,89 @@ def predict_error(
         conditions: view, sensor, and what the print is taken for.
     """
     conditions = conditions or Conditions()
-    camera, pose = _typical_view(probe, conditions)
-    means = _seen(probe, camera, pose, conditions)
-    nominal = _assembly(conditions, Registration())
-    response = BlockResponse(probe, nominal)
-    rows = response.light(means)
-    transfer = optical_transfer(means.cycles_per_px, conditions.blur_px**2)
-    clear = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
-    level = conditions.white / clear
-    light = np.concatenate([[level], prior_stddev(probe.frequencies, level)[1:]])
-    count = len(light)
-    means = replace(means, pixel_variance=_pixel_variance(rows, transfer, level, conditions))
-    gain = _estimator_gain(probe, means, response, transfer, light, conditions.white)
-    order = frequency_order(probe.frequencies)
+    trial = _Trial(probe, conditions)
+    stray = dot_response_error(probe, dots, tones or Tones(), trial.means, trial.camera_mm, conditions.print_blur_mm)
+    registration = [trial.change(assembly) for assembly in _misregistered(conditions)]
+    grown = [trial.change(assembly) for assembly in _grown(trial.nominal, conditions.dot_gain)]
+    squares: dict[str, list[Array]] = {DOTS: [], REGISTRATION: [], DOT_GAIN: [], CAMERA: []}
+    generator = np.random.default_rng(0)
+    for _ in range(_LIGHTS):
+        trial.light(generator)
+        squares[DOTS].append(trial.error(trial.rows_of(stray, trial.response.places[:, :3])))
+        for name, changes in ((REGISTRATION, registration), (DOT_GAIN, grown)):
+            squares[name].append(np.sum([trial.error(trial.rows_of(*change)) for change in changes], axis=0))
+        squares[CAMERA].append(trial.error(trial.noise(generator)))
+    return PredictedError({name: np.sqrt(np.mean(values, axis=0)) for name, values in squares.items()})
 
-    def relative(variance: Array) -> Array:
-        total = np.concatenate([variance[:1], variance[1::2] + variance[2::2]])
-        return np.array([np.sqrt(np.mean(total[order == k])) for k in range(order.max() + 1)]) / level
 
-    def systematic(changes: list[tuple[Array, NDArray[np.int64]]]) -> Array:
-        variance = np.zeros(count)
-        for change, places in changes:
-            strays = _dense(change * transfer[..., None], places, count)
-            variance += np.sum((gain @ strays * light) ** 2, axis=1)
-        return relative(variance)
+class _Trial:
+    """Measurements of a print under one light after another, and how far changes of theirs lead the estimate astray."""
 
-    stray = dot_response_error(probe, dots, tones or Tones(), means, pose.camera_centre_mm, conditions.print_blur_mm)
-    other = [BlockResponse(probe, assembly) for assembly in _misregistered(conditions)]
-    grown = [BlockResponse(probe, assembly) for assembly in _grown(nominal, conditions.dot_gain)]
-    return PredictedError(
-        {
-            DOTS: systematic([(stray, response.places[:, :3])]),
-            REGISTRATION: systematic([_difference(one, response, means) for one in other]),
-            DOT_GAIN: systematic([_difference(one, response, means) for one in grown]),
-            CAMERA: relative(_noise_variance(gain, means)),
-        }
-    )
+    def __init__(self, probe: Probe, conditions: Conditions) -> None:
+        camera, pose = _typical_view(probe, conditions)
+        self.camera_mm = pose.camera_centre_mm
+        self.nominal = _assembly(conditions, Registration())
+        self.response = BlockResponse(probe, self.nominal)
+        self._probe, self._conditions = probe, conditions
+        self._estimator = LightingEstimator(probe, self.nominal)
+        self._order = frequency_order(probe.frequencies)
+        clear = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
+        self._level = conditions.white / clear
+        means = _seen(probe, camera, pose, conditions)
+        self._transfer = optical_transfer(means.cycles_per_px, conditions.blur_px**2)
+        self._rows = self.response.light(means) * self._transfer[..., None]
+        variance = self._pixel_variance()
+        self.means = replace(means, pixel_variance=np.repeat(variance[:, None], 3, axis=1), shading=0.0 * means.shading)
+        self._spread = prior_stddev(probe.frequencies, self._level)[1:]
+        self._field = reflection_basis(np.array([block.center_mm for block in field_blocks(probe)], float))
+        self._x = np.zeros(0)
+        self._values = np.zeros(self._rows.shape[:2])
+        self._estimate = np.zeros(0, complex)
+
+    def change(self, assembly: Assembly) -> tuple[Array, NDArray[np.int64]]:
+        """What another assembly adds to the response's rows, and where its columns belong."""
+        other = BlockResponse(self._probe, assembly)
+        rows, base = other.light(self.means), self.response.light(self.means)
+        rows[..., : base.shape[2]] -= base
+        return rows, other.places
+
+    def light(self, generator: np.random.Generator) -> None:
+        """Go on to another light, and the reflection that comes with it."""
+        self._x = np.concatenate([[self._level], self._spread * generator.normal(size=len(self._spread))])
+        share = self._probe.slab.interface_reflectance(self.means.view_cosine)
+        uneven = self._conditions.reflection * self._conditions.white / np.mean(share)
+        weights = generator.normal(size=self._field.shape[1] - 1)
+        mirrored = share * (self._level / np.pi + uneven * (self._field[:, 1:] @ weights))
+        mirror = self.response.lower_mirror(self.means) * self._transfer
+        mirror[:, 0] += 1.0
+        lit = np.einsum("brk,bk->br", self._rows, self._x[self.response.places])
+        self._values = lit + mirror * mirrored[:, None]
+        self._estimate = self._estimated(self._values)
+
+    def rows_of(self, change: Array, places: NDArray[np.int64]) -> Array:
+        """(blocks, 7) what a change of the response does to the measurements."""
+        return np.einsum("brk,bk->br", change, self._x[places]) * self._transfer
+
+    def noise(self, generator: np.random.Generator) -> Array:
+        """(blocks, 7) noise of the pixels."""
+        covariance = self.means.covariance * self.means.pixel_variance[:, :1, None]
+        values, vectors = np.linalg.eigh(covariance)
+        draw = generator.normal(size=values.shape) * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(np.einsum("brs,bs->br", vectors, draw), float)
+
+    def error(self, change: Array) -> Array:
+        """(order + 1,) mean square over each order of how far a change moves the estimate, relative to L~_0."""
+        moved = np.abs(self._estimated(self._values + change) - self._estimate) ** 2 / self._level**2
+        return np.array([np.mean(moved[self._order == order]) for order in range(self._order.max() + 1)])
+
+    def _estimated(self, values: Array) -> NDArray[np.complex128]:
+        kept = np.arange(values.shape[1]) <= 2 * self.means.harmonics[:, None]
+        grey = np.repeat((values * kept)[..., None], 3, axis=2)
+        return self._estimator.estimate(replace(self.means, values=grey), 0.0).lighting.coefficients[:, _GREEN]
+
+    def _pixel_variance(self) -> Array:
+        radiance = self._level * self._rows[:, 0, 0]
+        return sensor_variance(radiance, self._conditions.read_noise, self._conditions.gain)
 
 
 def advice(probe: Probe, predicted: PredictedError, limit: float, dpi: float) -> list[str]:
@@ -201,68 +247,3 @@ def _grown(nominal: Assembly, dot_gain: float) -> list[Assembly]:
         replace(nominal, film=replace(nominal.film, dot_gain=dot_gain)),
         replace(nominal, paper=replace(nominal.paper, dot_gain=dot_gain)),
     ]
-
-
-def _difference(one: BlockResponse, nominal: BlockResponse, means: BlockMeans) -> tuple[Array, NDArray[np.int64]]:
-    change = one.light(means)
-    base = nominal.light(means)
-    change[..., : base.shape[2]] -= base
-    return change, one.places
-
-
-def _pixel_variance(rows: Array, transfer: Array, level: float, conditions: Conditions) -> Array:
-    radiance = level * rows[:, 0, 0] * transfer[:, 0]
-    variance = sensor_variance(radiance, conditions.read_noise, conditions.gain)
-    return np.repeat(variance[:, None], 3, axis=1)
-
-
-def _estimator_gain(
-    probe: Probe, means: BlockMeans, response: BlockResponse, transfer: Array, light: Array, white: float
-) -> Array:
-    """(c, blocks 7) what each row adds to each coefficient: (A' W A)^-1 A' W with the reflection as a nuisance."""
-    blocks, rows = transfer.shape
-    kinds = np.array([block.kind for block in field_blocks(probe)])
-    variance = row_variance(means, _GREEN, white, np.where(kinds == "clear_white", WHITE_MODEL, MEAN_MODEL))
-    mirror = response.lower_mirror(means) * transfer
-    mirror[:, 0] += 1.0
-    precision = np.where(_usable(means, transfer), 1.0 / variance, 0.0)
-    own = (_SPARKLE * white) ** 2
-    seen = precision * mirror
-    weight = -(own / (1.0 + own * np.sum(seen * mirror, axis=1)))[:, None, None] * seen[:, :, None] * seen[:, None, :]
-    weight[:, np.arange(rows), np.arange(rows)] += precision
-    centers = np.array([block.center_mm for block in field_blocks(probe)], float)
-    field = reflection_basis(centers)
-    unknown = np.concatenate(
-        [
-            _dense(response.light(means) * transfer[..., None], response.places, len(light)),
-            (mirror[:, :, None] * field[:, None, :]).reshape(blocks * rows, -1),
-        ],
-        axis=1,
-    )
-    weighted = np.einsum("brs,bsc->brc", weight, unknown.reshape(blocks, rows, -1)).reshape(unknown.shape)
-    prior = np.concatenate([[0.0], 1.0 / light[1:] ** 2, np.full(field.shape[1], 1.0 / (_FIELD * white) ** 2)])
-    return np.asarray(np.linalg.solve(unknown.T @ weighted + np.diag(prior), weighted.T)[: len(light)], float)
-
-
-def _usable(means: BlockMeans, transfer: Array) -> NDArray[np.bool_]:
-    order = np.repeat(np.arange(1, transfer.shape[1] // 2 + 1), 2)
-    usable = np.ones(transfer.shape, bool)
-    usable[:, 1:] = (order <= means.harmonics[:, None]) & (transfer[:, 1:] > _WEAKEST_TRANSFER)
-    return usable & means.valid[:, None]
-
-
-def _dense(rows: Array, places: NDArray[np.int64], count: int) -> Array:
-    """(blocks 7, c) rows over all coefficients, from rows (blocks, 7, k) and their places (blocks, k)."""
-    dense = np.zeros((*rows.shape[:2], count))
-    block = np.arange(len(rows))[:, None]
-    for column in range(places.shape[1]):
-        np.add.at(dense, (block, np.arange(rows.shape[1])[None], places[:, column : column + 1]), rows[..., column])
-    return dense.reshape(-1, count)
-
-
-def _noise_variance(gain: Array, means: BlockMeans) -> Array:
-    """(c,) variance of the coefficients by the pixels' noise."""
-    covariance = means.covariance * means.pixel_variance[:, :1, None]
-    blocks, rows = covariance.shape[:2]
-    by_block = gain.reshape(len(gain), blocks, rows)
-    return np.einsum("cbr,brs,cbs->c", by_block, covariance, by_block)
