@@ -28,7 +28,10 @@ def reflection_basis(centers_mm: Array) -> Array:
 
 
 def field_amplitude(observed: Array, floor: float) -> float:
-    """Standard deviation of the field, robust to a lamp mirrored in one of the black regions."""
+    """Standard deviation of the field, from what the black regions mirror.
+
+    A bright patch is mirrored in few of them; a deviation that ignored it would let the patch pass for light.
+    """
     if len(observed) < 3:
         return 10.0 * floor
-    return float(max(1.5 * np.median(np.abs(observed - np.median(observed))), floor))
+    return float(max(np.std(observed), floor))
