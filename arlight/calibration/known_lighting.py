@@ -21,7 +21,7 @@ from arlight.calibration.known_lighting_checks import (
 )
 from arlight.calibration.known_lighting_fit import KnownLightingFit, Normal
 from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.known_lighting_model import EXPECTED, LAYER_STDDEV, NAMES, SheetModel, Unknowns
+from arlight.calibration.known_lighting_model import EXPECTED, LAYER_STDDEV, NAMES, VIGNETTING, SheetModel, Unknowns
 from arlight.calibration.known_lighting_views import LitView, measure
 from arlight.calibration.known_lighting_weights import RowModel, white_level
 from arlight.calibration.layer_parameters import vector_of
@@ -95,6 +95,7 @@ def calibrate_known(
     probe: Probe,
     camera: Camera,
     start: Assembly | None = None,
+    vignetting: tuple[float, float, float] = (0.0, 0.0, 0.0),
     relative: bool = False,
     prior: CorrectionPrior | None = None,
     progress: Progress = lambda _done, _total: None,
@@ -111,6 +112,7 @@ def calibrate_known(
         probe: the sheet as designed.
         camera: the camera of all frames; vignetting is estimated beside what it has.
         start: an assembly near the truth, such as self-calibration gives.
+        vignetting: of the lens beside what the camera has, found together with `start`.
         relative: leave the brightness of every light open, in each channel.
         prior: how far single blocks stray from the model.
         progress: told how far the work is.
@@ -128,7 +130,7 @@ def calibrate_known(
     fit = KnownLightingFit(probe, lights, rows, prior or CorrectionPrior(), relative)
     approach = _APPROACH if start is None else _APPROACH[-1:]
     total = len(approach) + _PASSES * _STEPS + 1 + len(lights)
-    unknowns = _first(chosen, len(lights), probe, start)
+    unknowns = _first(chosen, len(lights), probe, start, vignetting)
     views = measure(chosen, lights, probe, camera, unknowns.assembly)
     if relative:
         unknowns = _with_exposures(unknowns, views, lights, probe)
@@ -155,12 +157,19 @@ def calibrate_known(
     return _result(unknowns, normal, views, errors, condition_number(lights, probe)[0], probe, fit.prior)
 
 
-def _first(seen: Sequence[SeenSheet], lightings: int, probe: Probe, start: Assembly | None) -> Unknowns:
+def _first(
+    seen: Sequence[SeenSheet],
+    lightings: int,
+    probe: Probe,
+    start: Assembly | None,
+    vignetting: tuple[float, float, float],
+) -> Unknowns:
     blocks = len(field_blocks(probe))
     layers = EXPECTED.copy()
     corrections = np.tile(MODEL, (blocks, 1))
     if start is not None:
         layers[:-1] = vector_of(start)
+        layers[list(VIGNETTING)] = vignetting[:2]
         corrections = corrections_of(start, blocks)
     own = np.array([[frame.pose.blur_px**2, 0.0, 0.0, 0.0, 0.0] for frame in seen])
     return Unknowns(layers, corrections, own, np.ones((lightings, 3)))

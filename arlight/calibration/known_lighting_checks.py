@@ -40,6 +40,8 @@ class LightingError:
     """The lighting."""
     orders: Array
     """(order + 1,) median over its views of each order's error, relative to |L~_0|."""
+    shape: float
+    """Median over its views of the error of orders 1 and 2 when the estimate is scaled to the light's L~_0."""
     estimate: ComplexArray
     """(k, 3) the coefficients that its first view told."""
 
@@ -119,7 +121,8 @@ def lighting_error(
         nuisances = [estimate.nuisance for estimate in estimates]
     found = [estimate.lighting.coefficients for estimate in estimates]
     errors = [order_errors(coefficients, truth, probe.frequencies) for coefficients in found]
-    return LightingError(light.name, np.median(errors, axis=0), found[0])
+    shapes = [_shape_error(coefficients, truth, probe.frequencies) for coefficients in found]
+    return LightingError(light.name, np.median(errors, axis=0), float(np.median(shapes)), found[0])
 
 
 def order_errors(found: ComplexArray, truth: ComplexArray, frequencies: NDArray[np.int64]) -> Array:
@@ -136,7 +139,7 @@ def check_match(errors: Sequence[LightingError], lights: Sequence[KnownLight], p
     Raises:
         CalibrationError: names the pair that fits worst, and what its frames look like instead.
     """
-    low = [float(np.sqrt(np.mean(error.orders[1:3] ** 2))) for error in errors]
+    low = [error.shape for error in errors]
     worst = int(np.argmax(low))
     if low[worst] > _MISMATCH:
         raise CalibrationError(
@@ -172,6 +175,11 @@ def _hint(error: LightingError, own: float, number: int, lights: Sequence[KnownL
         degrees = (np.rad2deg(yaws[int(np.argmin(turned))]) + 180.0) % 360.0 - 180.0
         return f"; turned by another {degrees:+.0f} degrees it would match"
     return ""
+
+
+def _shape_error(found: ComplexArray, truth: ComplexArray, frequencies: NDArray[np.int64]) -> float:
+    scaled = found * (truth[0].real / np.where(np.abs(found[0]) > 0.0, found[0].real, 1.0))
+    return float(np.sqrt(np.mean(order_errors(scaled, truth, frequencies)[1:3] ** 2)))
 
 
 def _relative(light: KnownLight, probe: Probe) -> Array:

@@ -30,7 +30,7 @@ LAYER_STEPS = np.append(layer_parameters.STEP, 1e-3)
 LAYER_STDDEV = np.append(layer_parameters.STDDEV, 0.15)
 # light that is not quite distant differs from light to light, and a gain that falls across the sheet is the blocks'
 LAYER_STDDEV[[NAMES.index("gradient_x"), NAMES.index("gradient_y")]] = 1e-6
-_VIGNETTING = (NAMES.index("vignetting_k1"), NAMES.index("vignetting_k2"))
+VIGNETTING = (NAMES.index("vignetting_k1"), NAMES.index("vignetting_k2"))
 _LOWER_FACE = NAMES.index("lower_face")
 
 VIEW_STEPS = np.array([1e-3, 1e-4, 1e-4, 1e-4, 1e-4])
@@ -62,7 +62,7 @@ class Unknowns:
     @property
     def vignetting(self) -> tuple[float, float]:
         """Radial gain of the lens beside what the camera already has."""
-        first, second = (float(self.layers[place]) for place in _VIGNETTING)
+        first, second = (float(self.layers[place]) for place in VIGNETTING)
         return first, second
 
 
