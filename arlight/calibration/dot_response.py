@@ -5,6 +5,8 @@ harmonics of the stripes; film and paper as the camera sees them keep theirs, an
 response is used: sums over dots, less the same sums over the design.
 """
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
+
+_FINEST_MM = 0.045
+"""Dots wider than this are summed over in parts: they are squares, and seen through each other at any offset."""
 
 
 def dot_response_error(
@@ -35,32 +40,36 @@ def dot_response_error(
     """
     blocks = field_blocks(probe)
     error = np.zeros((len(blocks), ROWS, 3))
-    sigma_dots = blur_mm * dots.dpi / MM_PER_INCH
+    parts = int(np.ceil(MM_PER_INCH / dots.dpi / _FINEST_MM))
+    fine = replace(probe, pixels_per_mm=probe.pixels_per_mm * parts)
+    sigma = blur_mm * fine.pixels_per_mm
+    inner = int(np.ceil(probe.slab.max_offset_mm * fine.pixels_per_mm))
     for i, block in enumerate(blocks):
         if block.frequency is None or block.phase_deg is None:
             continue
         place = patterns.block_pixels(probe, block)
-        phase = patterns.stripe_phase(probe, block, *place)
+        fine_place = [slice(parts * span.start, parts * span.stop) for span in place]
+        phase = patterns.stripe_phase(fine, block, fine_place[0], fine_place[1])
+        tau = np.radians(block.phase_deg)
         film = patterns.film_transmittance(phase, probe.design)
-        paper = patterns.paper_reflectance(phase, np.radians(block.phase_deg), probe.design)
-        shift = _view_dots(probe, block, camera_mm)
-        inner = int(np.ceil(probe.slab.max_offset_mm * probe.pixels_per_mm))
-        printed_film = _blurred(film + _strays(dots.film[place], film, tones.film), sigma_dots)
-        printed_paper = _blurred(paper + _strays(dots.paper[place], paper, tones.paper), sigma_dots)
-        actual = _rows(printed_film, printed_paper, phase, shift, inner)
-        error[i] = actual - _rows(_blurred(film, sigma_dots), _blurred(paper, sigma_dots), phase, shift, inner)
+        paper = patterns.paper_reflectance(phase, tau, probe.design)
+        printed_film = film + _strays(dots.film[place], film, tones.film, parts)
+        printed_paper = paper + _strays(dots.paper[place], paper, tones.paper, parts)
+        shift = _view_offset(fine, block, camera_mm)
+        actual = _rows(_blurred(printed_film, sigma), _blurred(printed_paper, sigma), phase, shift, inner)
+        error[i] = actual - _rows(_blurred(film, sigma), _blurred(paper, sigma), phase, shift, inner)
     scale = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
     return error * (scale * probe.slab.transmittance(means.view_cosine))[:, None, None]
 
 
-def _strays(dots: NDArray[np.bool_], value: Image, tone: ToneCurve | None) -> Image:
-    """What the dots are beside the share that was asked for."""
+def _strays(dots: NDArray[np.bool_], value: Image, tone: ToneCurve | None, parts: int) -> Image:
+    """What the dots are beside the share that was asked for, each in parts x parts samples."""
     share = value if tone is None else tone.compensated(value).astype(np.float32)
-    return np.asarray(dots - share, np.float32)
+    return np.asarray(dots.repeat(parts, axis=0).repeat(parts, axis=1) - share, np.float32)
 
 
-def _view_dots(probe: Probe, block: Block, camera_mm: Array) -> tuple[int, int]:
-    """Rows and columns from a film point to the paper point that is seen through it, in whole dots."""
+def _view_offset(probe: Probe, block: Block, camera_mm: Array) -> tuple[int, int]:
+    """Rows and columns from a film point to the paper point that is seen through it, in whole raster pixels."""
     toward = camera_mm - np.array([*block.center_mm, 0.0])
     offset = probe.slab.offset_mm(toward / np.linalg.norm(toward)) * probe.pixels_per_mm
     return round(float(offset[1])), -round(float(offset[0]))
