@@ -22,8 +22,12 @@ _REACH, _FINE_REACH = 0.22, 0.05
 _INLIER_PX = 1.0
 _TIGHT_PX = 0.4
 _TRIALS = 600
+_LEAST_SUPPORT = 0.4
 _SMOOTHING_PX = 0.7
 _CANDIDATES = 40
+_HOUGH_PASSES = ((0.8, 150.0), (0.6, 60.0), (0.5, 30.0))
+"""How round a circle must be and how strong its edges; later passes see fainter ones."""
+_NEARLY = 0.1
 _AS_GOOD = 0.85
 """A larger circle with this share of the best one's contour is preferred: a ball mirrors the horizon as a ring."""
 
@@ -166,6 +170,8 @@ def _most_supported(edges: Edges, start: BallOutline, reach: float, tolerance_px
     met = np.abs(away) * edges.px_per_rad < tolerance_px
     support = [np.unique(edges.direction[row]).size for row in met]
     best = int(np.argmax(support))
+    if support[best] < _LEAST_SUPPORT * CONTOUR_POINTS:
+        return None
     return BallOutline(axes[best], float(half_angles[best]))
 
 
@@ -204,25 +210,39 @@ def _nearest(edges: Edges, distance_px: Array) -> Array:
 
 
 def _candidates(picture: Picture, camera: Camera) -> list[BallOutline]:
-    """First guesses, as cones."""
+    """First guesses, as cones: circles in the picture as it is and with its local contrast evened out."""
     shrink = min(1.0, _SEARCH_WIDTH_PX / picture.shape[1])
     codes = np.clip(picture * 255.0, 0.0, 255.0).astype(np.uint8)
     small = cv2.resize(codes, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-    small = cv2.GaussianBlur(small, (0, 0), 1.0)
-    smallest = max(round(_SMALLEST_RADIUS_PX * shrink), 5)
-    largest = min(small.shape[:2]) // 2
-    outlines = []
-    for perfection, threshold in ((0.8, 150.0), (0.6, 60.0)):
-        circles = cv2.HoughCircles(
-            small, cv2.HOUGH_GRADIENT_ALT, 1.5, 8.0, param1=threshold, param2=perfection,
-            minRadius=smallest, maxRadius=largest,
-        )  # fmt: skip
-        if circles is None:
-            continue
-        for x, y, radius in np.asarray(circles, float).reshape(-1, np.asarray(circles).shape[-1])[:_CANDIDATES, :3]:
-            center = (np.array([x, y]) + 0.5) / shrink - 0.5
-            outlines.append(BallOutline.through_circle(camera, center, radius / shrink))
-    return outlines
+    circles: list[Array] = []
+    for image in (small, cv2.createCLAHE(8.0, (8, 8)).apply(small)):
+        smooth = np.asarray(cv2.GaussianBlur(image, (0, 0), 1.0), np.uint8)
+        for perfection, threshold in _HOUGH_PASSES:
+            circles += _new_circles(_hough(smooth, shrink, perfection, threshold), circles)
+    return [BallOutline.through_circle(camera, circle[:2], float(circle[2])) for circle in circles]
+
+
+def _hough(image: NDArray[np.uint8], shrink: float, perfection: float, threshold: float) -> Array:
+    """Circles (n, 3) x, y, radius in the full picture's pixels, the best first."""
+    smallest, largest = max(round(_SMALLEST_RADIUS_PX * shrink), 5), min(image.shape) // 2
+    found = cv2.HoughCircles(
+        image, cv2.HOUGH_GRADIENT_ALT, 1.5, 8.0, param1=threshold, param2=perfection, minRadius=smallest,
+        maxRadius=largest,
+    )  # fmt: skip
+    if found is None:
+        return np.zeros((0, 3))
+    circles = np.asarray(found, float).reshape(-1, np.asarray(found).shape[-1])[:_CANDIDATES, :3]
+    return np.column_stack([(circles[:, :2] + 0.5) / shrink - 0.5, circles[:, 2] / shrink])
+
+
+def _new_circles(circles: Array, known: list[Array]) -> list[Array]:
+    """The circles that are not nearly one of those known; a guess need not be good."""
+    fresh: list[Array] = []
+    for circle in circles:
+        near = _NEARLY * circle[2]
+        if not any(np.all(np.abs(circle - other) < near) for other in (*known, *fresh)):
+            fresh.append(circle)
+    return fresh
 
 
 def _inside(camera: Camera, outline: BallOutline) -> bool:

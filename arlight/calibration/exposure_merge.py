@@ -93,7 +93,7 @@ def _check_exposures(photographs: Sequence[Photograph], exposures: NDArray[np.fl
     if len(exposures) > 1 and exposures.max() < _LEAST_RATIO * exposures.min():
         raise PhotographError(
             f"{len(exposures)} pictures have the same exposure, {exposures.min():g} to {exposures.max():g} s; a "
-            "bracket needs exposures that differ, such as 1/1000, 1/60 and 1/4 s; if they do, state them: --exposures S S ..."
+            "bracket needs exposures that differ, such as 1/1000, 1/60 and 1/4 s; if they do, state them (--exposures)"
         )
 
 

@@ -234,7 +234,7 @@ def test_a_circle_of_nothing_is_refused(scene, radiance):
 
 
 def test_a_picture_without_the_sheet_is_refused(scene, front):
-    with pytest.raises(ProbeError, match="the sheet .* was not found"):
+    with pytest.raises(ProbeError, match=r"the sheet .* was not found"):
         capture_ball(bracket(scene.radiance(front, sheet=False, across=2)), scene.probe, CAMERA, 1.0)
 
 
