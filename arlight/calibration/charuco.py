@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 
 FEWEST_CORNERS = 8
 _DICTIONARY = "DICT_5X5_250"
-_MARKER_SHARE = 0.75
+_MARKER_SHARE = 0.6
+"""Side of a marker, relative to its square's; smaller than is usual, so that corners are seen by themselves."""
 _MOST_MARKERS = 250
 _TITLE_MM = 12.0
 _LARGEST_SEARCH_PX = 1600.0
@@ -109,8 +110,8 @@ def _refined(luma: NDArray[np.uint8], points_mm: Array, pixels: Array, square_mm
     beside = (neighbours > 0.0) & (neighbours < 1.1 * square_mm)
     nearest = np.min(np.where(beside, distance, np.inf), axis=1)
     nearest = np.where(np.isfinite(nearest), nearest, np.median(distance))
-    # the markers begin an eighth of a square from the corner, along the diagonal
-    half = int(np.clip(0.16 * np.min(nearest), 2, 8))
+    # the markers begin a fifth of a square from the corner, and the blur carries them farther
+    half = int(np.clip(0.2 * np.min(nearest) - 1.5, 2, 10))
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-4)
     start = np.ascontiguousarray(pixels[:, None], np.float32)
     found = cv2.cornerSubPix(np.ascontiguousarray(luma), start, (half, half), (-1, -1), criteria)

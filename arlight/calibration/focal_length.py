@@ -1,6 +1,6 @@
 """The camera of a clip that came without one, from the sheet in the clip itself."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +61,7 @@ def estimate_camera(
     Args:
         frames: the clip; read only as far as is needed.
         probe: the sheet in it.
-        frame_count: how many frames there are; a reader says so itself.
+        frame_count: how many frames there are; a reader or a list says so itself.
         pixel_aspect: width of a pixel relative to its height; a reader says so itself.
 
     Raises:
@@ -70,6 +70,8 @@ def estimate_camera(
     if isinstance(frames, VideoReader):
         frame_count = frames.frame_count if frame_count is None else frame_count
         pixel_aspect = float(frames.pixel_aspect or pixel_aspect)
+    elif isinstance(frames, Sized) and frame_count is None:
+        frame_count = len(frames)
     points = MarkerPoints(probe)
     found = _candidates(frames, points, frame_count)
     if not found:

@@ -1,4 +1,4 @@
-"""`arlight calibrate camera`: intrinsics from pictures of a printed board or of the sheet, and the response to light."""
+"""`arlight calibrate camera`: intrinsics from pictures of a printed board or of the sheet, and response to light."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
