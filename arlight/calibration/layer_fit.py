@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.layer_parameters import EXPECTED, LOW, NAMES, STDDEV, STEP, assembly_of
+from arlight.calibration.layer_parameters import EXPECTED, HIGH, LOW, NAMES, STDDEV, STEP, assembly_of
 from arlight.calibration.sheet_view import PredictedSheet, SheetView
 from arlight.estimation.channel_fit import _block_weights, _next_lamps, _without_lamps
 from arlight.estimation.prior import prior_stddev
@@ -102,7 +102,8 @@ class LayerFit:
                 # without light nothing is known of the layers yet
                 step = np.zeros(shared) if any(known is None for known in self._known) else step
             self._update_views(change, states)
-            vector = np.maximum(vector + step, LOW)
+            # a step of the prior's size is as far as the linearised model can be believed
+            vector = np.clip(vector + np.clip(step, -STDDEV, STDDEV), LOW, HIGH)
             for index, known in enumerate(self._known):
                 begin = shared + index * self._size
                 lights[index] = known(assembly_of(vector)) if known else lights[index] + change[begin:][: self._size]

@@ -1,4 +1,4 @@
-"""What self-calibration solves for: the assembled sheet, and the camera's vignetting, as one vector of named numbers."""
+"""What self-calibration solves for: the assembled sheet and the vignetting, as one vector of named numbers."""
 
 from dataclasses import dataclass
 
@@ -24,25 +24,27 @@ class Parameter:
     """Step of its numerical derivative."""
     low: float = -np.inf
     """Least value that means something."""
+    high: float = np.inf
+    """Greatest one."""
 
 
 PARAMETERS = (
     Parameter("film_x_mm", 0.0, 0.3, 0.005),
     Parameter("film_y_mm", 0.0, 0.3, 0.005),
     Parameter("film_rotation_deg", 0.0, 0.4, 0.01),
-    Parameter("film_scale", 1.0, 0.002, 1e-4),
+    Parameter("film_scale", 1.0, 0.002, 1e-4, 0.9, 1.1),
     Parameter("paper_x_mm", 0.0, 0.3, 0.005),
     Parameter("paper_y_mm", 0.0, 0.3, 0.005),
     Parameter("paper_rotation_deg", 0.0, 0.4, 0.01),
-    Parameter("paper_scale", 1.0, 0.002, 1e-4),
-    Parameter("glass_scale", 1.0, 0.05, 1e-3),
+    Parameter("paper_scale", 1.0, 0.002, 1e-4, 0.9, 1.1),
+    Parameter("glass_scale", 1.0, 0.05, 1e-3, 0.6, 1.8),
     # variances: blur acts through them, and they have no kink at zero
     Parameter("film_blur_mm2", 0.003, 0.01, 3e-4, 0.0),
     Parameter("paper_blur_mm2", 0.003, 0.01, 3e-4, 0.0),
-    Parameter("film_dot_gain", 0.0, 0.08, 2e-3, -0.2),
-    Parameter("paper_dot_gain", 0.0, 0.08, 2e-3, -0.2),
-    Parameter("film_solid", 0.01, 0.02, 2e-3, 0.0),
-    Parameter("paper_solid", 0.02, 0.03, 2e-3, 0.0),
+    Parameter("film_dot_gain", 0.0, 0.08, 2e-3, -0.2, 0.24),
+    Parameter("paper_dot_gain", 0.0, 0.08, 2e-3, -0.2, 0.24),
+    Parameter("film_solid", 0.01, 0.02, 2e-3, 0.0, 0.5),
+    Parameter("paper_solid", 0.02, 0.03, 2e-3, 0.0, 0.5),
     Parameter("vignetting_k1", 0.0, 0.15, 1e-2),
     Parameter("vignetting_k2", 0.0, 0.05, 1e-2),
     Parameter("lower_face", 1.0, 0.5, 0.05, 0.0),
@@ -54,6 +56,7 @@ EXPECTED = np.array([parameter.expected for parameter in PARAMETERS])
 STDDEV = np.array([parameter.stddev for parameter in PARAMETERS])
 STEP = np.array([parameter.step for parameter in PARAMETERS])
 LOW = np.array([parameter.low for parameter in PARAMETERS])
+HIGH = np.array([parameter.high for parameter in PARAMETERS])
 
 
 def assembly_of(vector: Array) -> Assembly:

@@ -34,7 +34,8 @@ class SheetView:
 
     @classmethod
     def of(
-        cls, means: BlockMeans, assembly: Assembly, probe: Probe, camera: Camera, pose: Pose, blur_px: float, light: int = 0
+        cls, means: BlockMeans, assembly: Assembly, probe: Probe, camera: Camera, pose: Pose, blur_px: float,
+        light: int = 0,
     ) -> "SheetView":  # fmt: skip
         """A view, with where its blocks lie in the picture."""
         centers = np.array([[*block.center_mm, 0.0] for block in field_blocks(probe)])

@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 _LENGTH_MM = 40.0
 """Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
 _KEPT_VARIANCE = 3e-3
+_PATCH = 15.0
+"""How bright a mirrored patch may be, relative to the field's usual deviation, before it is a lamp's."""
 
 
 def reflection_basis(centers_mm: Array) -> Array:
@@ -30,8 +32,11 @@ def reflection_basis(centers_mm: Array) -> Array:
 def field_amplitude(observed: Array, floor: float) -> float:
     """Standard deviation of the field, from what the black regions mirror.
 
-    A bright patch is mirrored in few of them; a deviation that ignored it would let the patch pass for light.
+    A bright patch is mirrored in few of them; a deviation that ignored it would let the patch pass for light. A lamp
+    counts as such a patch and no more.
     """
     if len(observed) < 3:
         return 10.0 * floor
-    return float(max(np.std(observed), floor))
+    away = observed - np.median(observed)
+    usual = max(1.5 * float(np.median(np.abs(away))), floor)
+    return float(max(np.std(np.clip(away, -_PATCH * usual, _PATCH * usual)), usual))

@@ -70,11 +70,13 @@ def test_amplitude_is_the_fields_spread_whatever_its_level():
     assert field_amplitude(observed + 5, 1e-4) == pytest.approx(field_amplitude(observed, 1e-4), rel=1e-9)
 
 
-def test_a_mirrored_lamp_does_not_set_the_amplitude():
+def test_a_mirrored_patch_sets_the_amplitude_and_a_lamp_counts_as_one():
     observed = np.random.default_rng(3).normal(0.1, 0.01, 20)
-    lamp = observed.copy()
+    patch, lamp = observed.copy(), observed.copy()
+    patch[:3] += 0.05
     lamp[:3] = 1.0
-    assert field_amplitude(lamp, 1e-4) < 2 * field_amplitude(observed, 1e-4)
+    assert field_amplitude(patch, 1e-4) == pytest.approx(np.std(patch), rel=1e-6)
+    assert 0.02 < field_amplitude(lamp, 1e-4) < 0.1
 
 
 def test_amplitude_has_a_floor_and_is_wide_where_little_was_seen():
