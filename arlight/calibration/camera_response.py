@@ -39,8 +39,12 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
         stride: one of so many frames is used, up to twelve.
 
     Raises:
-        CalibrationError: the sheet is not seen, or the pictures do not determine the curve.
+        CalibrationError: the sheet has no wedge or is not seen, or the pictures do not determine the curve.
     """
+    if not any(block.kind == "wedge" for block in probe.blocks):
+        raise CalibrationError(
+            "the camera's response cannot be measured: the sheet has no grey wedge; use one that `arlight probe` designed"
+        )
     plain = replace(camera, radiometry=None)
     tracker, sampler = PoseTracker(probe, plain), PaperSampler(probe, plain)
     samples: list[PaperSamples] = []

@@ -1,5 +1,7 @@
 """The response measured from a wedge whose codes were made by known curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -127,6 +129,12 @@ def test_pictures_without_the_sheet_are_refused(small_sheet, lens_camera):
     wall = Frame.from_rgb(np.full((480, 640, 3), 90, np.uint8))
     with pytest.raises(CalibrationError, match="no picture shows the sheet"):
         measure_response([wall], small_sheet, lens_camera)
+
+
+def test_a_sheet_without_a_wedge_is_refused(photographs, small_sheet, lens_camera):
+    bare = replace(small_sheet, blocks=tuple(block for block in small_sheet.blocks if block.kind != "wedge"))
+    with pytest.raises(CalibrationError, match="no grey wedge"):
+        measure_response(photographs, bare, lens_camera)
 
 
 def test_pictures_of_two_encodings_are_refused(photographs, small_sheet, lens_camera):
