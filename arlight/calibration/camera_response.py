@@ -43,7 +43,7 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
     """
     if not any(block.kind == "wedge" for block in probe.blocks):
         raise CalibrationError(
-            "the camera's response cannot be measured: the sheet has no grey wedge; use one that `arlight probe` designed"
+            "the camera's response cannot be measured: the sheet has no grey wedge; `arlight probe` designs one"
         )
     plain = replace(camera, radiometry=None)
     tracker, sampler = PoseTracker(probe, plain), PaperSampler(probe, plain)
