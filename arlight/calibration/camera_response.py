@@ -46,7 +46,28 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
             "the camera's response cannot be measured: the sheet has no grey wedge; `arlight probe` designs one"
         )
     plain = replace(camera, radiometry=None)
-    tracker, sampler = PoseTracker(probe, plain), PaperSampler(probe, plain)
+    used, samples = _sightings(frames, probe, plain, stride)
+    if not used:
+        raise CalibrationError(
+            "the camera's response cannot be measured: no picture shows the sheet; film its whole frame, sharp, and "
+            "give its probe.json (--probe FILE)"
+        )
+    fit = fit_response(patches_of(samples), used[0].format.transfer, max(probe.sheet_mm) / 2.0)
+    curve = Radiometry(fit.response, fit.black)
+    curve = replace(curve, clip=clipping_level(used, curve))
+    read_noise, shot_gain = fit_noise(samples, curve)
+    return CameraResponse(replace(curve, read_noise=read_noise, shot_gain=shot_gain), fit, len(used))
+
+
+def _sightings(
+    frames: Iterable[Frame], probe: Probe, camera: Camera, stride: int
+) -> tuple[list[Frame], list[PaperSamples]]:
+    """Frames that show the sheet, and their paper.
+
+    Raises:
+        CalibrationError: the frames are not encoded alike.
+    """
+    tracker, sampler = PoseTracker(probe, camera), PaperSampler(probe, camera)
     samples: list[PaperSamples] = []
     used: list[Frame] = []
     for number, frame in enumerate(frames):
@@ -66,13 +87,4 @@ def measure_response(frames: Iterable[Frame], probe: Probe, camera: Camera, stri
             used.append(frame)
         if len(used) >= MOST_FRAMES:
             break
-    if not used:
-        raise CalibrationError(
-            "the camera's response cannot be measured: no picture shows the sheet; film its whole frame, sharp, and "
-            "give its probe.json (--probe FILE)"
-        )
-    fit = fit_response(patches_of(samples), used[0].format.transfer, max(probe.sheet_mm) / 2.0)
-    curve = Radiometry(fit.response, fit.black)
-    curve = replace(curve, clip=clipping_level(used, curve))
-    read_noise, shot_gain = fit_noise(samples, curve)
-    return CameraResponse(replace(curve, read_noise=read_noise, shot_gain=shot_gain), fit, len(used))
+    return used, samples

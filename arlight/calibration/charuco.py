@@ -154,16 +154,21 @@ def write_board(board: CharucoBoard, path: Path, paper: Paper) -> None:
         _add_marker(markers, board, number, left + float(corners[0][0]), top - float(corners[0][1]))
     # one path, one fill: no seams between black modules
     canvas.drawPath(markers, stroke=0, fill=1)
+    _draw_title(canvas, board, paper)
+    canvas.showPage()
+    canvas.save()
+
+
+def _draw_title(canvas: Canvas, board: CharucoBoard, paper: Paper) -> None:
+    height, width = PAGE_MM[paper]
     canvas.setFont("Helvetica", 8)
     canvas.drawCentredString(
         width / 2.0 * mm,
         (height - PRINT_MARGIN_MM - 4.0) * mm,
-        f"arlight calibrate camera   {board.columns} x {board.rows} squares of {side:g} mm   PRINT AT 100 % "
-        f"({paper.upper()}, actual size): {board.columns} squares must measure {board_width:g} mm; glue it to "
+        f"arlight calibrate camera   {board.columns} x {board.rows} squares of {board.square_mm:g} mm   PRINT AT 100 % "
+        f"({paper.upper()}, actual size): {board.columns} squares must measure {board.size_mm[0]:g} mm; glue it to "
         "something flat",
     )
-    canvas.showPage()
-    canvas.save()
 
 
 def _add_marker(path: Any, board: CharucoBoard, number: int, left: float, top: float) -> None:

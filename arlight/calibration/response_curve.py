@@ -123,13 +123,17 @@ def fit_response(patches: Sequence[Patch], transfer: Transfer, half_sheet_mm: fl
             "probe.json is this sheet's, that no shadow or reflection lies on a part of the frame, and film it brighter"
         )
     covered = float(encoded.min()), float(encoded.max())
-    inside = np.linspace(*covered, 200)
-    change = _signal(inside, found.x[:-1], transfer) / _signal(inside, np.zeros(_DEVIATIONS), transfer)
-    change /= np.median(change)
     return ResponseFit(
         tuple(response), float(found.x[-1]), float(np.sqrt(covariance[-1, -1])),
-        float(np.max(np.abs(change - 1.0))), float(np.sqrt(np.mean(error**2))) * stddev, covered,
+        _change(covered, found.x[:-1], transfer), float(np.sqrt(np.mean(error**2))) * stddev, covered,
     )  # fmt: skip
+
+
+def _change(covered: tuple[float, float], deviations: Array, transfer: Transfer) -> float:
+    """Largest relative change of the footage's curve within a range, a common factor apart."""
+    inside = np.linspace(*covered, 200)
+    share = _signal(inside, deviations, transfer) / _signal(inside, np.zeros(_DEVIATIONS), transfer)
+    return float(np.max(np.abs(share / np.median(share) - 1.0)))
 
 
 def _central(values: Array) -> Array:
