@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -22,7 +21,6 @@ from arlight.probe.wedge import (
 )
 
 Array = NDArray[np.float64]
-Medium = Literal["paper", "film"]
 
 _PX_PER_MM = 8.0
 """Resolution of the straightened page."""

@@ -1,5 +1,6 @@
 """guide.pdf: one page that says how to print the layers, stack them and check the result."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from reportlab.lib.enums import TA_LEFT
@@ -19,7 +20,14 @@ _HEADING = ParagraphStyle("heading", parent=_TEXT, fontName="Helvetica-Bold", fo
 _DRAWING_MM = 66.0
 
 
-def write_guide(probe: Probe, path: Path, paper: Paper, mirror_film: bool = True) -> None:
+def write_guide(
+    probe: Probe,
+    path: Path,
+    paper: Paper,
+    mirror_film: bool = True,
+    dpi: float | None = None,
+    notes: Sequence[str] = (),
+) -> None:
     """Write the assembly guide.
 
     Args:
@@ -27,6 +35,8 @@ def write_guide(probe: Probe, path: Path, paper: Paper, mirror_film: bool = True
         path: guide.pdf.
         paper: page to print on.
         mirror_film: whether top.pdf is mirrored.
+        dpi: resolution of the layers' dots; None where they are grey.
+        notes: what else there is to say about this printer, one paragraph each.
 
     Raises:
         OSError: the file cannot be written.
@@ -41,9 +51,11 @@ def write_guide(probe: Probe, path: Path, paper: Paper, mirror_film: bool = True
     y -= _DRAWING_MM + 3.0
     sections = {
         "You need": _materials(probe),
-        "Print and build": _steps(mirror_film),
+        "Print and build": _steps(mirror_film, dpi),
         "Check": _checks(probe),
     }
+    if notes:
+        sections["This printer"] = list(notes)
     for heading, lines in sections.items():
         y = _flow(canvas, [Paragraph(heading, _HEADING)], width, y)
         numbered = heading == "Print and build"
@@ -88,17 +100,23 @@ def _materials(probe: Probe) -> list[str]:
     ]
 
 
-def _steps(mirror_film: bool) -> list[str]:
+def _steps(mirror_film: bool, dpi: float | None) -> list[str]:
     ink = (
         "The film is printed <b>mirrored</b>: turn it over, so that its <b>ink lies on the glass</b> and its title "
         "reads the right way round."
         if mirror_film
         else "The film is printed unmirrored: its <b>ink faces up</b>, away from the glass."
     )
+    tones = (
+        "The grey levels are encoded for sRGB, as printers expect: apply no other correction."
+        if dpi is None
+        else f"The pages are black dots of <b>{dpi:.0f} dpi</b>: set the printer to that resolution, and switch off "
+        "smoothing, resolution enhancement and every correction."
+    )
     return [
         "Print bottom.pdf on paper, top.pdf on the transparency and frame.pdf on heavy paper, all on the same printer, "
         "at <b>100\u00a0% (actual size)</b>, best quality, black ink only, page-fitting and toner-saving options off. "
-        "The grey levels are encoded for sRGB, as printers expect: apply no other correction.",
+        + tones,
         "Lay a steel ruler on each printed ruler: it must measure <b>100.0 mm</b>. If not, scaling is still on.",
         "Cut out the frame's window along the thin line. Trim the layers along their corner marks once film and paper "
         "are taped: until then the marks and crosses in the margin are needed.",

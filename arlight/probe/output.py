@@ -1,11 +1,13 @@
 """Everything that `arlight probe` writes, into one folder, all of it or nothing."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from arlight.errors import OutputError
 from arlight.probe.design import Probe
 from arlight.probe.guide import write_guide
+from arlight.probe.halftone import Halftones
 from arlight.probe.layout import require_page
 from arlight.probe.pages import Paper
 from arlight.probe.preview import preview_image
@@ -14,7 +16,14 @@ from arlight.probe.rasters import render_rasters, write_rasters
 from arlight.probe.storage import save_probe
 
 
-def write_probe(probe: Probe, folder: Path | str, paper: Paper = "a4", mirror_film: bool = True) -> list[Path]:
+def write_probe(
+    probe: Probe,
+    folder: Path | str,
+    paper: Paper = "a4",
+    mirror_film: bool = True,
+    dots: Halftones | None = None,
+    notes: Sequence[str] = (),
+) -> list[Path]:
     """Write probe.json, the rasters, the PDFs, preview.png and guide.pdf.
 
     The files are made beside their places and moved there when all are complete: a failure leaves what stood in the
@@ -25,6 +34,9 @@ def write_probe(probe: Probe, folder: Path | str, paper: Paper = "a4", mirror_fi
         folder: where to; made if it does not exist.
         paper: page that is printed on.
         mirror_film: print the film mirrored, for ink that faces the glass.
+        dots: the layers as a bilevel printer's dots, which the PDFs then hold; in grey, for the printer to screen, by
+            default.
+        notes: what the guide says about this printer beside the rest, one paragraph each.
 
     Returns:
         The files, probe.json first.
@@ -38,7 +50,7 @@ def write_probe(probe: Probe, folder: Path | str, paper: Paper = "a4", mirror_fi
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".probe-", dir=folder) as temporary:
-            made = _make(probe, Path(temporary), paper, mirror_film)
+            made = _make(probe, Path(temporary), paper, mirror_film, dots, notes)
             return _move(made, folder)
     except OSError as error:
         raise OutputError(
@@ -46,13 +58,15 @@ def write_probe(probe: Probe, folder: Path | str, paper: Paper = "a4", mirror_fi
         ) from error
 
 
-def _make(probe: Probe, folder: Path, paper: Paper, mirror_film: bool) -> list[Path]:
+def _make(
+    probe: Probe, folder: Path, paper: Paper, mirror_film: bool, dots: Halftones | None, notes: Sequence[str]
+) -> list[Path]:
     rasters = render_rasters(probe)
     save_probe(probe, folder / "probe.json")
     paths = [folder / "probe.json", *write_rasters(rasters, probe.pixels_per_mm, folder)]
-    paths += write_pdfs(probe, rasters, folder, paper, mirror_film)
+    paths += write_pdfs(probe, dots or rasters, folder, paper, mirror_film)
     preview_image(probe, rasters).save(folder / "preview.png", compress_level=9)
-    write_guide(probe, folder / "guide.pdf", paper, mirror_film)
+    write_guide(probe, folder / "guide.pdf", paper, mirror_film, None if dots is None else dots.dpi, notes)
     return [*paths, folder / "preview.png", folder / "guide.pdf"]
 
 

@@ -35,15 +35,15 @@ class PrinterProfile:
         return Tones(film=self.film, paper=self.paper)
 
     def require_dpi(self, dpi: int) -> None:
-        """Refuse to print with other dots than the profile was measured with.
+        """Refuse other dots than the profile was measured with.
 
         Raises:
             ProbeError: the resolutions differ.
         """
         if dpi != self.dpi:
             raise ProbeError(
-                f"the printer's profile was measured at {self.dpi} dpi and the sheet is to be printed at {dpi} dpi, "
-                f"whose dots grow differently; print at {self.dpi} dpi, or print and measure a wedge at {dpi} dpi"
+                f"the printer's profile is of {self.dpi} dpi, found {dpi} dpi, whose dots grow differently; use {self.dpi} "
+                f"dpi, or print and measure a wedge at {dpi} dpi"
             )
 
 

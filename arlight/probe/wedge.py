@@ -5,6 +5,7 @@ light that falls off across the page cancels. Four fiducials tell where the patc
 """
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
+from arlight.errors import OutputError
 from arlight.probe.dots_image import draw_dots
 from arlight.probe.halftone import MM_PER_INCH, Bilevel, even_tone
 from arlight.probe.page_marks import draw_crop_marks, draw_crosses, draw_ruler, draw_title, placement
@@ -95,6 +97,30 @@ def wedge_dots(dpi: Dpi, tone: ToneCurve | None = None) -> Bilevel:
         side = where[0].stop - where[0].start
         page[where] = cv2.aruco.generateImageMarker(dictionary, marker, side) > 127
     return page
+
+
+def write_wedge_folder(folder: Path, dpi: Dpi, paper: Paper, tone: ToneCurve | None = None) -> Path:
+    """Write wedge.pdf into a folder, made if it does not exist; an older one is replaced when the new one is complete.
+
+    Returns:
+        Where it is.
+
+    Raises:
+        OutputError: the folder or the file cannot be written.
+    """
+    path = folder / "wedge.pdf"
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, but a file is to be written there; choose another output folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".wedge-", dir=folder) as temporary:
+            made = Path(temporary) / path.name
+            write_wedge(made, dpi, paper, tone)
+            return made.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: the wedge cannot be written there ({error.strerror or error}); choose another folder"
+        ) from error
 
 
 def write_wedge(path: Path, dpi: Dpi, paper: Paper, tone: ToneCurve | None = None) -> None:
