@@ -42,8 +42,8 @@ class PrinterProfile:
         """
         if dpi != self.dpi:
             raise ProbeError(
-                f"the printer's profile is of {self.dpi} dpi, found {dpi} dpi, whose dots grow differently; use {self.dpi} "
-                f"dpi, or print and measure a wedge at {dpi} dpi"
+                f"the printer's profile is of {self.dpi} dpi, found {dpi} dpi, whose dots grow differently; use "
+                f"{self.dpi} dpi, or print and measure a wedge at {dpi} dpi"
             )
 
 
