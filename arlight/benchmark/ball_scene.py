@@ -18,7 +18,7 @@ from arlight.environment import Environment
 Array = NDArray[np.float64]
 Finish = Literal["mirror", "matte"]
 
-_NORMAL_ROWS = 48
+_NORMAL_ROWS = 32
 _EDGE_PX = 3
 
 

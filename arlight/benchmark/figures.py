@@ -50,7 +50,7 @@ class LightFigure:
     """The light as the ball showed it."""
 
     def errors(self, coefficients: Complex) -> NDArray[np.float64]:
-        """(order + 1,) error of each order: rms over coefficients and channels against the truth, relative to |L~_0|."""
+        """(order + 1,) error of each order: rms over coefficients and channels, relative to |L~_0|."""
         order = frequency_order(self.estimate.frequencies)
         level = np.sqrt(np.mean(np.abs(self.truth[0]) ** 2))
         squares = np.abs(coefficients - self.truth) ** 2

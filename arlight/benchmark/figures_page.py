@@ -30,7 +30,7 @@ def draw_figures(figures: Sequence[LightFigure]) -> Figure:
         figures: one or more lights.
     """
     order = figures[0].estimate.order
-    heights = [2.9] * len(figures) + [1.65 * len(figures) + 1.1]
+    heights = [2.9] * len(figures) + [2.3 * len(figures) + 0.8]
     page = Figure(figsize=(12.0, sum(heights) + 0.5), layout="constrained", facecolor="white")
     page.suptitle(
         f"Light by the planar sheet (one 8-bit picture, order {order}) and by a mirrored ball (bracketed pictures)",
@@ -46,10 +46,12 @@ def draw_figures(figures: Sequence[LightFigure]) -> Figure:
 
 def _draw_light(part: SubFigure, figure: LightFigure, title: str) -> None:
     """Photograph, coefficients and disks of one light."""
-    grid = part.add_gridspec(2, 5, width_ratios=[1.7, 2.4, 1.0, 1.0, 1.0])
+    grid = part.add_gridspec(2, 5, width_ratios=[2.0, 2.4, 1.0, 1.0, 1.0])
     part.suptitle(f"{title}: {figure.name}", fontsize=11, x=0.01, ha="left", color=_INK)
     photograph = part.add_subplot(grid[:, 0])
-    photograph.imshow(figure.photograph)
+    width = figure.photograph.shape[1]
+    # the table left of the sheet is empty
+    photograph.imshow(figure.photograph[:, width // 5 :])
     photograph.set_title("what the camera saw", fontsize=9)
     photograph.set_axis_off()
     real, imaginary = part.add_subplot(grid[0, 1]), part.add_subplot(grid[1, 1])
@@ -94,7 +96,7 @@ def _draw_coefficients(axes: Axes, figure: LightFigure, part: str) -> None:
     axes.tick_params(axis="y", labelsize=7)
     axes.set_ylabel(f"{part} / $L_0$", fontsize=8)
     axes.spines[["top", "right"]].set_visible(False)
-    top = 1.25 if part == "real" else max(0.1, 1.15 * float(np.abs(true.imag).max()))
+    top = 1.55 if part == "real" else max(0.1, 1.15 * float(np.abs(true.imag).max()))
     axes.set_ylim(min(-0.05, 1.3 * float(shown.min())) if part == "real" else -top, top)
 
 
@@ -103,7 +105,7 @@ def _draw_higher_orders(part: SubFigure, figures: Sequence[LightFigure]) -> None
     top = figures[0].estimate.order
     orders = list(range(2, top + 1)) or [1]
     part.suptitle("Figure 8: higher orders", fontsize=11, x=0.01, ha="left", color=_INK)
-    grid = part.add_gridspec(2 * len(figures), len(orders) + 2, width_ratios=[1.0] * (len(orders) + 1) + [2.6])
+    grid = part.add_gridspec(2 * len(figures), len(orders) + 2, width_ratios=[1.0] * (len(orders) + 1) + [2.2])
     for row, figure in enumerate(figures):
         actual = _received(figure, figure.ball_environment)
         scale = float(np.nanmax(_series(figure, figure.ball, top))) * 0.8
@@ -114,7 +116,7 @@ def _draw_higher_orders(part: SubFigure, figures: Sequence[LightFigure]) -> None
                 title = f"order {order}" if row == 0 and below == 0 else ""
                 _draw_disk(axes, _series(figure, coefficients, order), scale, title)
                 if column == 0:
-                    axes.text(-0.62, 0.0, f"{figure.name}\n{source}", rotation=90, ha="center", va="center", fontsize=8)
+                    axes.text(-0.72, 0.0, f"{figure.name}\n{source}", ha="right", va="center", fontsize=9)
         title = "all orders" if row == 0 else ""
         _draw_disk(part.add_subplot(grid[2 * row : 2 * row + 2, len(orders)]), actual, scale, title)
     _draw_errors(part.add_subplot(grid[:, -1]), figures)

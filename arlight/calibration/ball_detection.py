@@ -104,7 +104,7 @@ def ball_at(
     given = BallOutline.through_circle(camera, center_px, radius_px)
     found = refine_outline(contrast_picture(radiance), camera, given)
     center, radius = found.outline.circle_px(camera)
-    near = np.hypot(*(center - center_px)) < 0.1 * radius_px and abs(radius - radius_px) < 0.1 * radius_px
+    near = np.hypot(*(center - center_px)) < _REACH * radius_px and abs(radius - radius_px) < _REACH * radius_px
     if near and found.contour_share >= _LEAST_CONTOUR:
         return found
     return FoundBall(given, 0.0, float("nan"))
