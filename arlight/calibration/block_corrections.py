@@ -36,6 +36,24 @@ class CorrectionPrior:
         return np.array([getattr(self, kind) for kind in KINDS], float)
 
 
+def learnt_prior(
+    prior: CorrectionPrior, corrections: Array, variance: Array, widest: CorrectionPrior
+) -> CorrectionPrior:
+    """How far this sheet's blocks stray: the spread under which the corrections that were found are most likely.
+
+    A damped step of MacKay's evidence update, which divides by the number of well-determined corrections.
+
+    Args:
+        prior: the spread that the corrections were found with.
+        corrections: (blocks, 4); variance: (blocks, 4) of their errors.
+        widest: limit of the spread; a tenth of it is the other.
+    """
+    determined = np.sum(np.clip(1.0 - variance / prior.stddev**2, 0.02, 1.0), axis=0)
+    spread = np.sqrt(np.sum((corrections - MODEL) ** 2, axis=0) / determined)
+    damped = np.clip(np.sqrt(spread * prior.stddev), 0.1 * widest.stddev, widest.stddev)
+    return CorrectionPrior(*map(float, damped))
+
+
 def corrections_of(assembly: Assembly, count: int) -> Array:
     """(count, 4) corrections of an assembly's blocks; those that change nothing where it has none."""
     if assembly.blocks is None:

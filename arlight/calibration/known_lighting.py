@@ -142,6 +142,7 @@ def calibrate_known(
         views = measure(chosen, lights, probe, camera, unknowns.assembly, _predicted(unknowns, views, lights, probe))
         for _ in range(_STEPS):
             unknowns, _ = fit.step(unknowns, views, probe.order, 0.0)
+            fit.learn_prior(unknowns)
             progress(done := done + 1, total)
     normal = fit.normal(unknowns, views)
     progress(done := done + 1, total)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.block_corrections import MODEL, CorrectionPrior
+from arlight.calibration.block_corrections import MODEL, CorrectionPrior, learnt_prior
 from arlight.calibration.known_lighting_light import KnownLight
 from arlight.calibration.known_lighting_model import (
     EXPECTED,
@@ -110,15 +110,22 @@ class KnownLightingFit:
         self.prior = prior
         """How far blocks stray from the layers' model."""
         self._relative = relative
+        self._widest = prior
+        self._block_variance: Array = np.zeros((0, len(MODEL)))
 
     def step(
         self, unknowns: Unknowns, views: list[LitView], highest_order: int, tolerance: float
     ) -> tuple[Unknowns, float]:
         """One step; returns the unknowns after it and its length in prior standard deviations of the layers."""
         normal = self.normal(unknowns, views, highest_order, tolerance)
-        change, _ = normal.solve()
+        change, covariance = normal.solve()
+        self._block_variance = np.diagonal(covariance)[-unknowns.blocks.size :].reshape(unknowns.blocks.shape)
         length = float(np.max(np.abs(change[: len(NAMES)]) / LAYER_STDDEV))
         return self.moved(unknowns, change * min(1.0, _LONGEST_STEP / max(length, 1e-12))), length
+
+    def learn_prior(self, unknowns: Unknowns) -> None:
+        """Take over how far this sheet's blocks stray from the model, after a step."""
+        self.prior = learnt_prior(self.prior, unknowns.blocks, self._block_variance, self._widest)
 
     def normal(
         self, unknowns: Unknowns, views: list[LitView], highest_order: int = 8, tolerance: float = 0.0
@@ -130,6 +137,8 @@ class KnownLightingFit:
         matrices = np.zeros((len(self._lights), places.size, places.size))
         right = np.zeros((len(self._lights), places.size))
         squared = np.zeros((len(views), len(unknowns.blocks)))
+        # what codec and model get wrong repeats from view to view: views count for less than their number
+        repeated = float(np.sqrt(len(views)))
         for number, view in enumerate(views):
             prediction = linear.predict(view, number)
             weighted = model.weigh(view, prediction, float(unknowns.views[number, 0]))
@@ -144,7 +153,7 @@ class KnownLightingFit:
                     index = np.append(at, places.exposure(view.sheet.light).start + channel)
                 _add(
                     matrices[view.sheet.light], right[view.sheet.light], places.first_block, index, design,
-                    single[:, :, channel], weighted.precision[channel], weighted.residual[..., channel],
+                    single[:, :, channel], weighted.precision[channel] / repeated, weighted.residual[..., channel],
                 )  # fmt: skip
         inverse_variance, pull = self._priors(unknowns, views, places)
         return Normal(matrices, right, inverse_variance, pull, squared)
