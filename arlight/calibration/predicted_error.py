@@ -192,18 +192,19 @@ def advice(probe: Probe, predicted: PredictedError, limit: float, dpi: float) ->
         return []
     worst = max(bad, key=lambda order: float(predicted.total[order]))
     cause = predicted.worst_cause(worst)
-    remedies = {
-        DOTS: f"print with more than {dpi:g} dpi",
-        REGISTRATION: "calibrate the layers' registration on footage",
-        DOT_GAIN: "print a wedge (--wedge), measure it and give its profile with --printer-profile",
-        CAMERA: "film the sheet larger in the picture, or with more light",
-    }
     good = bad[0] - 1
     fewer = f"a sheet of order {good} (--order {good})" if good >= 1 else "a lower order"
+    finer = f"{fewer}; or glass thicker than {probe.glass_mm:g} mm, for the stripes' period grows with it"
+    remedies = {
+        DOTS: f"print with more than {dpi:g} dpi; {finer}",
+        REGISTRATION: f"calibrate the layers' registration on footage; {finer}",
+        DOT_GAIN: "print a wedge (--wedge), measure it and give its profile with --printer-profile; or calibrate the "
+        "layers on footage",
+        CAMERA: f"film the sheet larger in the picture, or with more light; {finer}",
+    }
     return [
         f"order {', '.join(str(order) for order in bad)}: predicted error above {100.0 * limit:g} %, mostly by {cause}",
-        f"what helps: {remedies[cause]}; {fewer}; or glass thicker than {probe.glass_mm:g} mm, for the stripes' "
-        "period grows with it",
+        f"what helps: {remedies[cause]}",
     ]
 
 
