@@ -80,7 +80,8 @@ def run(options: ProbeOptions) -> int:
     dots, predicted, notes = None, None, []
     if dpi is not None:
         tones = Tones() if profile is None else profile.tones
-        dots, predicted = _printed(probe, dpi, tones)
+        with Console(stderr=True).status(f"dots of {dpi} dpi"):
+            dots, predicted = _printed(probe, dpi, tones)
         notes = _notes(probe, predicted, tones, dpi)
     written = write_probe(probe, options.output, options.paper, options.mirror_film, dots, notes)
     _summarise(console, probe, notes, written)
