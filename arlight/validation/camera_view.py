@@ -1,7 +1,7 @@
 """What a camera sees of the lit sheet: the matte paper's light through glass and film, mirrored light in both faces.
 
-The paper's light does not depend on the viewer, so a camera path only branches at the faces of the glass; every branch is
-followed with its weight, none is chosen by chance. Fresnel's reflectance comes from Mitsuba.
+The paper's light does not depend on the viewer, so a camera path only branches at the faces of the glass; every branch
+is followed with its weight, none is chosen by chance. Fresnel's reflectance comes from Mitsuba.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The lights of the proof: soft captured environments, exposed for the camera, some for tests and some for calibration."""
+"""The lights of the proof: soft captured environments, exposed for the camera, for tests and for calibration."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -51,7 +51,9 @@ def reference_radiance(
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(start))
     ray = mi.RayDifferential3f(
-        mi.Ray3f(mi.Point3f(*(mi.Float(np.ascontiguousarray(axis)) for axis in start.T)), mi.Vector3f(*(-toward)))
+        mi.Ray3f(
+            mi.Point3f(*(mi.Float(np.ascontiguousarray(axis)) for axis in start.T)), mi.Vector3f(*(-toward).tolist())
+        )
     )
     radiance, _, _ = integrator.sample(scene, sampler, ray)
     values = np.stack([np.array(channel) for channel in radiance], axis=-1).astype(float)
@@ -72,7 +74,8 @@ def _scene(mi: ModuleType, layers: AssembledLayers, environment: Environment) ->
         return place.rotate([1, 0, 0], 180) if down else place
 
     def texture(values: NDArray[np.float32]) -> dict[str, Any]:
-        bitmap = mi.Bitmap(np.ascontiguousarray(values[..., None], np.float32))
+        # Mitsuba counts v upward from the first row, which is our last
+        bitmap = mi.Bitmap(np.ascontiguousarray(values[::-1, :, None], np.float32))
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
     glass = {"type": "dielectric", "int_ior": float(layers.slab.refractive_index), "ext_ior": 1.0}

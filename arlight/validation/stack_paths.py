@@ -25,7 +25,7 @@ _REFLECTION, _TRANSMISSION = 0, 1
 
 @dataclass(frozen=True, slots=True)
 class StackPaths:
-    """Paths that leave a paper point at the origin upward; irradiance is the sum of weight * film * paper * radiance."""
+    """Paths that leave a paper point at the origin; irradiance is the sum of weight * film * paper * radiance."""
 
     weight: Array
     """(paths,) pi times the share of the paths times what the faces let through [sr]."""
