@@ -130,9 +130,13 @@ class LayerFit:
         return normal, right, float(np.mean(chi2))
 
     def _sheets(self, vector: Array) -> list[PredictedSheet]:
-        """The sheet as it is, then one for each layer parameter with that one a step further."""
+        """The sheet as it is, again without its glass's echoes, and one with each layer parameter a step further.
+
+        What the parameters change in the echoes is far below what the derivatives need.
+        """
         steps = np.vstack([np.zeros(len(vector)), np.diag(STEP)[:_LAYERS]])
-        return [PredictedSheet(self._probe, assembly_of(vector + step)) for step in steps]
+        stepped = [PredictedSheet(self._probe, assembly_of(vector + step), echoes=False) for step in steps]
+        return [PredictedSheet(self._probe, assembly_of(vector)), *stepped]
 
     def _add_light_priors(self, normal: Array, right: Array, lights: list[Array]) -> None:
         for index, light in enumerate(lights):
@@ -208,9 +212,9 @@ class _ViewRows:
         self.transfer = optical_transfer(view.means.cycles_per_px, state.blur_px2)
         gain = vignetting * plane * np.exp(state.log_exposure)
         scale = self.transfer * gain[:, None]
-        rows, lower = sheets[0].rows(view)
-        places = sheets[0].response.places
         light = lights[view.light]
+        rows, lower = sheets[0].rows(view, light / light[0] if light[0] > 0.0 else None)
+        places = sheets[0].response.places
         unit = np.einsum("brk,bk->br", rows, light[places])
         lit = unit * scale
         reflection = fit._basis @ state.reflection
@@ -221,9 +225,9 @@ class _ViewRows:
         self.residual = view.means.values[:, :, _GREEN] - model
         # columns
         shared = np.zeros((*lit.shape, len(vector) + fit._size))
+        lit_by = [np.einsum("brk,bk->br", sheet.rows(view)[0], light[sheet.response.places]) for sheet in sheets[1:]]
         for i in range(_LAYERS):
-            stepped, _ = sheets[i + 1].rows(view)
-            shared[:, :, i] = (np.einsum("brk,bk->br", stepped, light[sheets[i + 1].response.places]) - unit) / STEP[i]
+            shared[:, :, i] = (lit_by[i + 1] - lit_by[0]) / STEP[i]
         shared[:, :, :_LAYERS] *= scale[..., None]
         over = model / vignetting[:, None]
         shared[:, :, NAMES.index("vignetting_k1")] = over * squared[:, None]

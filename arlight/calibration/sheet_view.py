@@ -47,16 +47,16 @@ class SheetView:
 class PredictedSheet:
     """What the blocks of an assembled sheet show; prepared once for all views."""
 
-    def __init__(self, probe: Probe, assembly: Assembly) -> None:
+    def __init__(self, probe: Probe, assembly: Assembly, *, echoes: bool = True) -> None:
         self._probe = probe
         self._layout = BlockLayout.of_probe(probe, assembly)
         self._slab = assembly.slab(probe)
-        self.response = BlockResponse(probe, assembly)
+        self.response = BlockResponse(probe, assembly, echoes=echoes)
 
-    def rows(self, view: SheetView) -> tuple[Array, Array]:
+    def rows(self, view: SheetView, shape: Array | None = None) -> tuple[Array, Array]:
         """Rows (blocks, 7, c) of unit coefficients and (blocks, 7) of the lower face's mirror reflection, before blur.
 
-        They are in the film phase that the view was measured with.
+        They are in the film phase that the view was measured with; `shape` as for `BlockResponse.light`.
         """
         measured = BlockLayout.of_probe(self._probe, view.assembly)
         lead = self._phase(self._layout) - self._phase(measured)
@@ -64,7 +64,7 @@ class PredictedSheet:
             measured, view.assembly.slab(self._probe).glass_mm, view.pose
         )
         means = replace(view.means, view_phasor=view.means.view_phasor * np.exp(-1j * turned))
-        return _advanced(self.response.light(means), lead), _advanced(
+        return _advanced(self.response.light(means, shape), lead), _advanced(
             self.response.lower_mirror(means)[..., None], lead
         )[..., 0]
 

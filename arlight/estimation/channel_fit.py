@@ -42,6 +42,8 @@ class Nuisance:
     """Mirror reflection in the glass's lower face, relative to Fresnel's; less where paper sticks to the glass."""
     color_spread: tuple[float, float] = (COLOR_SPREAD, COLOR_SPREAD)
     """How far red and blue coefficients stray from green's, relative to L~_0 at order 1."""
+    shape: Array | None = None
+    """(2k - 1,) green's real-packed coefficients at the measured frequencies, relative to L~_0; None if unknown."""
 
 
 @dataclass(frozen=True, slots=True)

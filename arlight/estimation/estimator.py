@@ -78,9 +78,13 @@ class LightingEstimator:
             The estimate. Blocks that were not seen add nothing; with none at all the covariance is the prior's.
         """
         start = nuisance or Nuisance()
-        rows = self._response.light(means)
         white = self._white_level(means)
         lower = self._response.lower_mirror(means)
+        shape = start.shape
+        if shape is None:
+            rows = self._response.light(means)
+            shape = _shape(self._fit(means, rows, lower, _GREEN, white, start, None))
+        rows = self._response.light(means, shape)
         green = self._fit(means, rows, lower, _GREEN, white, start, None)
         red, blue = (self._fit(means, rows, lower, channel, white, green.nuisance, green) for channel in (0, 2))
         fits = (red, green, blue)
@@ -91,7 +95,7 @@ class LightingEstimator:
         lighting = self._lighting(fits, time_s)
         reflection = np.stack([fit.reflection for fit in fits], axis=1)
         stripes = _guide(np.stack([fit.predicted for fit in fits], axis=2), white)
-        learnt = replace(green.nuisance, color_spread=spreads)
+        learnt = replace(green.nuisance, color_spread=spreads, shape=_shape(green))
         return Estimate(lighting, stripes, reflection, learnt, green.unexplained)
 
     def _lighting(self, fits: tuple[ChannelFit, ...], time_s: float) -> Lighting:
@@ -147,6 +151,11 @@ class LightingEstimator:
     def _color_spread(self, fit: ChannelFit, green: ChannelFit, last: float) -> float:
         difference = fit.packed - green.packed * (fit.packed[0] / max(green.packed[0], 1e-6))
         return color_spread(self._frequencies, float(fit.packed[0]), difference, np.diagonal(fit.covariance), last)
+
+
+def _shape(green: ChannelFit) -> Array:
+    """Real-packed coefficients relative to L~_0."""
+    return green.packed / max(float(green.packed[0]), 1e-6)
 
 
 def _guide(predicted: Array, white: Array) -> Array:

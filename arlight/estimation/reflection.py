@@ -39,4 +39,4 @@ def field_amplitude(observed: Array, floor: float) -> float:
         return 10.0 * floor
     away = observed - np.median(observed)
     usual = max(1.5 * float(np.median(np.abs(away))), floor)
-    return float(max(np.std(np.clip(away, -_PATCH * usual, _PATCH * usual)), usual))
+    return max(float(np.std(np.clip(away, -_PATCH * usual, _PATCH * usual))), usual)

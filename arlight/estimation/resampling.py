@@ -10,15 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.radiance_prior import hemisphere_points, radiance_covariance, received_operator
+from arlight.estimation.radiance_prior import hemisphere_points, predictor, radiance_covariance, received_operator
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 
 Array = NDArray[np.float64]
 
 _DIRECTIONS = 1024
-_NOISE = 0.003
-"""Standard deviation of the measured coefficients that the prediction allows for, relative to the prior's L~_0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +51,6 @@ def resampling(probe: Probe, assembly: Assembly) -> Resampling | None:
     seen = received_operator(slab, measured, directions, solid_angle)
     wanted = received_operator(slab, probe.frequencies, directions, solid_angle)
     prior = radiance_covariance(directions, directions)
-    scale = float(wanted[0] @ prior @ wanted[0])
-    gram = seen @ prior @ seen.T / scale
-    cross = wanted @ prior @ seen.T / scale
-    matrix = np.linalg.solve(gram + _NOISE**2 * np.eye(len(gram)), cross.T).T
-    missing = wanted @ prior @ wanted.T / scale - matrix @ cross.T
+    matrix = wanted @ prior @ predictor(seen, directions)
+    missing = (wanted @ prior @ wanted.T - matrix @ (seen @ prior @ wanted.T)) / (wanted[0] @ prior @ wanted[0])
     return Resampling(np.asarray(matrix, float), np.asarray(0.5 * (missing + missing.T), float))

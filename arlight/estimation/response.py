@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.layer_series import HARMONICS as STACK_HARMONICS
+from arlight.estimation.resampling import measured_frequencies
+from arlight.estimation.slab_echo import uniform_light
 from arlight.estimation.stack import paper_light
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Block, Probe
@@ -25,34 +27,62 @@ class BlockResponse:
     places: NDArray[np.int64]
     """(blocks, c) which real-packed coefficients the columns of a block's rows belong to."""
 
-    def __init__(self, probe: Probe, assembly: Assembly | None = None, *, bounces: bool = True) -> None:
+    def __init__(
+        self, probe: Probe, assembly: Assembly | None = None, *, bounces: bool = True, echoes: bool = True
+    ) -> None:
         """Solve the stack of every block.
 
         Args:
             probe: the sheet.
             assembly: how it was printed and put together; exactly as designed by default.
             bounces: follow the light reflected between paper and glass.
+            echoes: follow the light that goes back and forth inside the glass.
         """
         blocks = field_blocks(probe)
-        light = paper_light(probe, blocks, assembly, bounces=bounces)
+        light = paper_light(probe, blocks, assembly, bounces=bounces, echoes=echoes)
         self._slab = (assembly or Assembly()).slab(probe)
+        self._film = _toeplitz(light.film)
+        self._echo = light.echo
+        self._usual_light = uniform_light(self._slab, measured_frequencies(probe, assembly or Assembly()))
+        # share of the light that the film's second crossing leaves on its way out
+        self._passed_twice = np.einsum("bl,bl->b", light.film, np.conj(light.film)).real
         # (blocks, m, l, c): film harmonic m - l times radiosity harmonic l
-        self._paths = _toeplitz(light.film)[..., None] * light.radiosity[:, None]
+        self._paths = self._film[..., None] * light.radiosity[:, None]
         self.places, known = _places(probe, blocks, self._paths.shape[3])
         self._paths *= known[:, None, None, :]
         # the lower face mirrors through the film twice, 2 D(v) apart: film harmonics m - l and l, turned by 2 l b
-        self._mirror = _toeplitz(light.film) * light.film[:, None]
+        self._mirror = self._film * light.film[:, None]
         self._clear = float(probe.film_transmittance)
 
-    def light(self, means: BlockMeans) -> Array:
+    def light(self, means: BlockMeans, shape: Array | None = None) -> Array:
         """Rows (blocks, 7, c) for unit coefficients before blur.
 
         Columns are L_0, Re L_n and Im L_n of each block's own frequency n, then Re L_2n and Im L_2n where the film has
         a second harmonic; `places` has where they belong.
+
+        Args:
+            means: says from where the blocks are seen.
+            shape: (2k - 1,) real-packed coefficients relative to L_0, as far as known, for what the light near the
+                horizon does inside the glass; a uniform sky's by default.
         """
         turn = view_powers(means.view_phasor, 1)
         series = np.einsum("bmlk,bl->bmk", self._paths, turn)
-        return _real_rows(series) * (self._slab.transmittance(means.view_cosine) / np.pi)[:, None, None]
+        if self._echo is not None:
+            echo = self._echo @ (self._usual_light if shape is None else shape)
+            series[:, :, 0] += np.einsum("bml,bl->bm", self._film, echo * turn)
+        return _real_rows(series) * (self._leaving(means.view_cosine) / np.pi)[:, None, None]
+
+    def _leaving(self, view_cosine: Array) -> Array:
+        """(blocks,) share of the paper's light that leaves toward the viewer, beside the film's first crossing.
+
+        What the upper face sends back crosses the film twice more before it leaves 2 D(v) further on; that small part
+        counts with the film's mean square.
+        """
+        transmittance = self._slab.transmittance(view_cosine)
+        if self._echo is None:
+            return np.asarray(transmittance, float)
+        twice = self._slab.interface_reflectance(view_cosine) ** 2
+        return np.asarray(transmittance * (1.0 - twice) / (1.0 - twice * self._passed_twice), float)
 
     def lower_mirror(self, means: BlockMeans) -> Array:
         """Rows (blocks, 7) of the mirror reflection in the glass's lower face, where the upper face's is 1."""

@@ -19,6 +19,8 @@ from arlight.estimation.layer_series import (
     paper_series,
     turned,
 )
+from arlight.estimation.resampling import measured_frequencies
+from arlight.estimation.slab_echo import echo_irradiance
 from arlight.optics import Slab
 from arlight.probe.assembly import Assembly, BlockCorrections
 from arlight.probe.design import Block, Probe
@@ -43,10 +45,18 @@ class PaperLight:
     """(blocks, 2 H + 1, 3 or 5): harmonics -H..H of the paper's radiosity for unit coefficients."""
     film: ComplexArray
     """(blocks, 2 H + 1): harmonics -H..H of the film's transmittance."""
+    echo: ComplexArray | None
+    """(blocks, 2 H + 1, 2k - 1): radiosity from light that went back and forth in the glass, beyond what T counts, for
+    unit real-packed coefficients; None without bounces."""
 
 
 def paper_light(
-    probe: Probe, blocks: tuple[Block, ...], assembly: Assembly | None = None, *, bounces: bool = True
+    probe: Probe,
+    blocks: tuple[Block, ...],
+    assembly: Assembly | None = None,
+    *,
+    bounces: bool = True,
+    echoes: bool = True,
 ) -> PaperLight:
     """Solve for the paper's radiosity in the middle of each block.
 
@@ -55,6 +65,7 @@ def paper_light(
         blocks: the blocks of the field, patterned or not.
         assembly: how the sheet was printed and put together; exactly as designed by default.
         bounces: follow the light reflected between paper and glass; without it, single scattering as in the paper.
+        echoes: also work out `echo`.
 
     Returns:
         Harmonics in the phase of the film's pattern at the paper point; for blocks without pattern only harmonic 0
@@ -71,7 +82,13 @@ def paper_light(
     if assembly.blocks is not None:
         paper = _corrected(paper, assembly.blocks, probe.paper_reflectance)
     slab = assembly.slab(probe)
-    return PaperLight(_radiosity(film, paper, np.hypot(*film_cycles.T) * slab.period_mm, slab, bounces), film)
+    cycles = film_cycles * slab.period_mm
+    reflect = convolution(paper)
+    if not bounces:
+        return PaperLight(np.asarray(reflect @ _entering(film), complex), film, None)
+    gathered = _gathered(film, reflect, np.hypot(*cycles.T), slab)
+    echo = echo_irradiance(film, cycles, slab, measured_frequencies(probe, assembly)) if echoes else None
+    return PaperLight(gathered @ _entering(film), film, None if echo is None else gathered @ echo)
 
 
 def _paper_lead(assembly: Assembly, blocks: tuple[Block, ...], film_cycles: Array, paper_cycles: Array) -> Array:
@@ -95,14 +112,10 @@ def _corrected(paper: ComplexArray, blocks: BlockCorrections, reflectance: float
     return np.asarray(stripes * blocks.gain[:, None], complex)
 
 
-def _radiosity(film: ComplexArray, paper: ComplexArray, frequency: Array, slab: Slab, bounces: bool) -> ComplexArray:
-    """Solve (1 - g K) B = g E for unit coefficients."""
-    entering = _entering(film)
-    reflect = convolution(paper)
-    if not bounces:
-        return np.asarray(reflect @ entering, complex)
+def _gathered(film: ComplexArray, reflect: ComplexArray, frequency: Array, slab: Slab) -> ComplexArray:
+    """(blocks, m, l) radiosity (1 - g K)^-1 g of the light that enters, harmonic by harmonic."""
     returned = _returned_light(film, frequency, slab)
-    return np.asarray(np.linalg.solve(np.eye(film.shape[1]) - reflect @ returned, reflect @ entering), complex)
+    return np.asarray(np.linalg.solve(np.eye(film.shape[1]) - reflect @ returned, reflect), complex)
 
 
 def _entering(film: ComplexArray) -> ComplexArray:

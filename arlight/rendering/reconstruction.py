@@ -15,13 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arlight.estimation.radiance_prior import hemisphere_points, radiance_covariance, received_operator
+from arlight.estimation.radiance_prior import hemisphere_points, predictor, radiance_covariance, received_operator
 from arlight.optics import Slab
 
 Array = NDArray[np.float64]
-
-_TYPICAL_NOISE = 0.003
-"""Standard deviation of a coefficient that S stands for, relative to the prior's rms of L~_0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +82,7 @@ def reconstruct(
         raise ValueError(f"surroundings_albedo must lie in [0, 1], found {surroundings_albedo}")
     directions = hemisphere_points(direction_count)
     operator = received_operator(slab, frequencies, directions, np.full(direction_count, 2.0 * np.pi / direction_count))
-    covariance_rows = radiance_covariance(directions, directions) @ operator.T
-    gram = operator @ covariance_rows
-    noise = _TYPICAL_NOISE**2 * gram[0, 0] * np.eye(len(gram))
-    weights = np.linalg.solve(gram + noise, operator).T
+    weights = predictor(operator, directions)
     return Reconstruction(
         directions, radiance_covariance(directions, directions) @ weights, weights, surroundings_albedo
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -104,11 +105,21 @@ def lit(probe: Probe, response: BlockResponse) -> Callable[..., BlockMeans]:
     patterned = column > 0
     places = np.stack([np.zeros_like(column), np.where(patterned, 2 * column - 1, 0), 2 * column], axis=1)
 
-    def add(means: BlockMeans, coefficients, mirrored=0.0, blur_variance_px2=0.4, lower_face=1.0, noise_seed=None):
+    def add(
+        means: BlockMeans,
+        coefficients,
+        mirrored=0.0,
+        blur_variance_px2=0.4,
+        lower_face=1.0,
+        noise_seed=None,
+        usual=False,
+    ):
         transfer = optical_transfer(means.cycles_per_px, blur_variance_px2)
-        known = pack_real(coefficients)[places]
+        packed = pack_real(coefficients)
+        known = packed[places]
         known[~patterned, 1:] = 0.0
-        values = np.einsum("brk,bkc->brc", response.light(means), known)
+        shape = None if usual else packed[:, 1] / max(packed[0, 1], 1e-6)
+        values = np.einsum("brk,bkc->brc", response.light(means, shape), known)
         mirror = lower_face * response.lower_mirror(means)
         mirror[:, 0] += 1.0
         mirrored = np.broadcast_to(mirrored, (len(blocks), 3))
@@ -121,3 +132,9 @@ def lit(probe: Probe, response: BlockResponse) -> Callable[..., BlockMeans]:
         return replace(means, values=means.values + values)
 
     return add
+
+
+@pytest.fixture(scope="session")
+def lit_as_usual(lit: Callable[..., BlockMeans]) -> Callable[..., BlockMeans]:
+    """The same for light whose horizon does in the glass what a uniform sky's does, as the bare response has it."""
+    return partial(lit, usual=True)

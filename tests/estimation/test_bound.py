@@ -33,13 +33,13 @@ def measured(blank):
     return replace(means, covariance=covariance)
 
 
-def jacobian(lit, means, size):
+def jacobian(lit_as_usual, means, size):
     """(blocks, 7, size) change of every row with every packed coefficient."""
     columns = []
     for k in range(size):
         packed = np.zeros((size, 3))
         packed[k] = 1.0
-        columns.append(lit(means, unpack_real(packed), blur_variance_px2=BLUR).values[:, :, 0])
+        columns.append(lit_as_usual(means, unpack_real(packed), blur_variance_px2=BLUR).values[:, :, 0])
     return np.stack(columns, axis=-1)
 
 
@@ -57,10 +57,10 @@ def complex_stddev(variance):
     return np.sqrt(np.concatenate([variance[:1], variance[1::2] + variance[2::2]]))
 
 
-def test_the_bound_is_the_inverse_information(probe, bound, measured, lit):
+def test_the_bound_is_the_inverse_information(probe, bound, measured, lit_as_usual):
     size = 2 * len(probe.frequencies) - 1
     pixel_variance = np.random.default_rng(2).uniform(1.0, 9.0, (len(measured.valid), 3)) * 1e-5
-    full = jacobian(lit, measured, size)
+    full = jacobian(lit_as_usual, measured, size)
     found = bound.stddev(measured, pixel_variance, BLUR)
     for channel in range(3):
         rows = whitened(measured, full, pixel_variance[:, channel])
@@ -68,10 +68,10 @@ def test_the_bound_is_the_inverse_information(probe, bound, measured, lit):
         np.testing.assert_allclose(found[:, channel], expected, rtol=1e-6)
 
 
-def test_least_squares_on_pure_noise_reaches_it(probe, bound, measured, lit):
+def test_least_squares_on_pure_noise_reaches_it(probe, bound, measured, lit_as_usual):
     size = 2 * len(probe.frequencies) - 1
     pixel_variance = np.full((len(measured.valid), 3), 4e-5)
-    rows = whitened(measured, jacobian(lit, measured, size), pixel_variance[:, 0])
+    rows = whitened(measured, jacobian(lit_as_usual, measured, size), pixel_variance[:, 0])
     noise = np.random.default_rng(3).normal(size=(len(rows), 4000))
     errors, *_ = np.linalg.lstsq(rows, noise)
     found = bound.stddev(measured, pixel_variance, BLUR)[:, 0]

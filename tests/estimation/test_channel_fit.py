@@ -44,10 +44,10 @@ def error(found, truth):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exact_rows_are_solved(fit, blank, lit, random_light, probe, seed):
+def test_exact_rows_are_solved(fit, blank, lit_as_usual, random_light, probe, seed):
     truth = random_light(seed)
     plane = 0.03 + 0.01 * np.array([[b.center_mm[0] / 50.0] for b in field_blocks(probe)])
-    found = fit(lit(blank(), truth, mirrored=plane))
+    found = fit(lit_as_usual(blank(), truth, mirrored=plane))
     # with a prior this wide there is nothing that pulls
     assert error(found, truth) < 2e-3
     np.testing.assert_allclose(found.field, plane[:, 0], atol=3e-4)
@@ -55,25 +55,25 @@ def test_exact_rows_are_solved(fit, blank, lit, random_light, probe, seed):
     assert found.chi2 < 0.01
 
 
-def test_predictions_are_the_rows_that_were_given(fit, blank, lit, random_light):
-    means = lit(blank(), random_light(3), mirrored=0.04)
+def test_predictions_are_the_rows_that_were_given(fit, blank, lit_as_usual, random_light):
+    means = lit_as_usual(blank(), random_light(3), mirrored=0.04)
     np.testing.assert_allclose(fit(means).predicted, means.values[:, :, GREEN], atol=1e-3)
 
 
-def test_mirrored_lamps_are_read_off_block_by_block(fit, blank, lit, random_light):
+def test_mirrored_lamps_are_read_off_block_by_block(fit, blank, lit_as_usual, random_light):
     truth, means = random_light(4), blank()
     lamps = np.zeros((len(means.valid), 3))
     struck = np.random.default_rng(1).choice(len(lamps), 6, replace=False)
     lamps[struck] = np.linspace(0.05, 0.9, 6)[:, None]
-    found = fit(lit(means, truth, mirrored=0.02 + lamps))
+    found = fit(lit_as_usual(means, truth, mirrored=0.02 + lamps))
     np.testing.assert_allclose(found.field, 0.02, atol=0.003)
     np.testing.assert_allclose(found.reflection[struck], 0.02 + lamps[struck, 0], rtol=0.05, atol=0.003)
     assert error(found, truth) < 5e-3
 
 
-def test_rows_that_stray_are_given_little_weight(fit, blank, lit, random_light, white):
+def test_rows_that_stray_are_given_little_weight(fit, blank, lit_as_usual, random_light, white):
     truth = random_light(5)
-    means = lit(blank(), truth)
+    means = lit_as_usual(blank(), truth)
     generator = np.random.default_rng(2)
     spoilt = means.values.copy()
     for block in generator.choice(np.flatnonzero(means.harmonics > 0), 8, replace=False):
@@ -83,9 +83,9 @@ def test_rows_that_stray_are_given_little_weight(fit, blank, lit, random_light, 
     assert found.chi2 > fit(means).chi2
 
 
-def test_what_was_not_measured_does_not_count(fit, blank, lit, random_light):
+def test_what_was_not_measured_does_not_count(fit, blank, lit_as_usual, random_light):
     truth = random_light(6)
-    means = lit(blank(), truth)
+    means = lit_as_usual(blank(), truth)
     fewer = replace(means, harmonics=np.minimum(means.harmonics, 2), valid=np.arange(len(means.valid)) % 7 != 3)
     expected = fit(fewer)
     garbage = means.values.copy()
@@ -100,9 +100,9 @@ def test_what_was_not_measured_does_not_count(fit, blank, lit, random_light):
 
 
 @pytest.mark.parametrize("blur", [0.0, 0.2, 0.6, 1.0, 2.0])
-def test_blur_is_found_from_wherever_it_starts(fit, blank, lit, random_light, blur):
+def test_blur_is_found_from_wherever_it_starts(fit, blank, lit_as_usual, random_light, blur):
     truth = random_light(7)
-    means = lit(blank(), truth, blur_variance_px2=blur)
+    means = lit_as_usual(blank(), truth, blur_variance_px2=blur)
     for start in (0.1, 0.5, 1.2):
         found = fit(means, Nuisance(blur_variance_px2=start), passes=10)
         assert found.nuisance.blur_variance_px2 == pytest.approx(blur, abs=0.03)
@@ -117,16 +117,16 @@ def test_nuisance_stays_in_its_range_on_nonsense(fit, blank):
     assert 0.0 <= nuisance.lower_face <= 2.0
 
 
-def test_paper_that_sticks_to_the_glass_shows_in_the_lower_face(fit, blank, lit, random_light):
+def test_paper_that_sticks_to_the_glass_shows_in_the_lower_face(fit, blank, lit_as_usual, random_light):
     truth = random_light(8)
     for face in (0.4, 1.0):
-        found = fit(lit(blank(), truth, mirrored=0.1, lower_face=face), passes=20)
+        found = fit(lit_as_usual(blank(), truth, mirrored=0.1, lower_face=face), passes=20)
         assert found.nuisance.lower_face == pytest.approx(face, abs=0.03)
         assert error(found, truth) < 0.01
 
 
-def test_without_blocks_the_prior_and_the_first_guess_are_left(fit, blank, lit, random_light):
-    means = lit(blank(), random_light(9))
+def test_without_blocks_the_prior_and_the_first_guess_are_left(fit, blank, lit_as_usual, random_light):
+    means = lit_as_usual(blank(), random_light(9))
     start = Nuisance(0.7, 0.9)
     found = fit(replace(means, valid=np.zeros(len(means.valid), bool)), start)
     assert np.isnan(found.chi2)

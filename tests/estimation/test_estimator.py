@@ -193,7 +193,7 @@ def test_a_hidden_part_of_the_sheet_costs_certainty_not_correctness(estimator, b
     kept = np.random.default_rng(15).random(len(means.valid)) > share
     full, part = estimator.estimate(means, 0.0).lighting, estimator.estimate(only(means, kept), 0.0).lighting
     assert_sound(part)
-    assert np.all(part.stddev[:, 1] > 0.99 * full.stddev[:, 1])
+    assert np.all(part.stddev[:, 1] > 0.95 * full.stddev[:, 1])
     deviation = np.abs(part.coefficients - truth) / part.stddev
     assert np.sqrt(np.mean(deviation**2)) < 1.5
 

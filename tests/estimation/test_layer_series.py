@@ -41,9 +41,7 @@ def test_series_are_the_toned_and_blurred_print(design, phase_deg):
         covered = 1 - values
         grown = covered + 4 * 0.12 * covered * (1 - covered)
         printed = blurred_print(0.05 + 0.95 * (1 - grown), 0.11 / PERIOD_MM * 400)
-        np.testing.assert_allclose(
-            series((block(phase_deg),), design, made, cycles)[0], analysis @ printed, atol=1e-9
-        )
+        np.testing.assert_allclose(series((block(phase_deg),), design, made, cycles)[0], analysis @ printed, atol=1e-9)
 
 
 def test_turning_is_a_shift_of_the_pattern():

@@ -185,7 +185,10 @@ def test_with_bounces_rows_are_traced_light(design, number, seed):
     block = probe.blocks[number]
     sheet = Sheet(design, block, lamps, received)
     means = means_seen(probe, view)
-    more, less = (BlockResponse(probe, bounces=b).light(means)[number] @ sheet.coefficients() for b in (True, False))
+    more, less = (
+        BlockResponse(probe, bounces=bounces, echoes=False).light(means)[number] @ sheet.coefficients()
+        for bounces in (True, False)
+    )
     batches = []
     for _ in range(16):
         pixel = pixels_over_a_period(generator, 80)
@@ -227,7 +230,8 @@ def test_turning_sheet_light_and_view_together_changes_nothing(design):
     response = BlockResponse(probe)
     phases = len({block.phase_deg for block in probe.blocks} - {None})
     upright, across = response.light(means_seen(probe, view))[:phases], response.light(means_seen(probe, turned))
-    np.testing.assert_allclose(upright, across[phases : 2 * phases], atol=1e-12)
+    # the directions over which the horizon's light is predicted are not symmetrical themselves
+    np.testing.assert_allclose(upright, across[phases : 2 * phases], atol=1e-7)
 
 
 def test_opposite_phases_of_the_matched_design_add_up_to_white_paper():
