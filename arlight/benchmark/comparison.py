@@ -11,13 +11,12 @@ from arlight.benchmark.figures import FigureError
 from arlight.benchmark.matte_ball import harmonics, matte_ball_light
 from arlight.benchmark.probe_scene import MATTE_REFLECTANCE, MIRROR_REFLECTANCE, LitScene, ProbeScene
 from arlight.benchmark.relit_objects import RelitObjects
+from arlight.benchmark.sheet_light import SheetLight
 from arlight.calibration.ball_capture import CapturedBall, CaptureSettings, capture_ball
 from arlight.calibration.ball_outline import BallOutline
 from arlight.calibration.mirror_ball import MapGrid
 from arlight.calibration.photographs import Photograph
 from arlight.environment import Environment
-from arlight.fourier import pack_real
-from arlight.rendering.reconstruction import Reconstruction, reconstruct
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,6 @@ METHODS = ("planar sheet", "mirrored ball", "matte ball", "mirrored ball, bracke
 """The last needs several pictures: it tells what clipping costs the mirrored ball."""
 _ROWS = 96
 _SUBSAMPLES = 3
-_CHUNK = 2048
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +57,7 @@ class Comparison:
         grid = self.objects.grid
         self._directions = grid.directions().reshape(-1, 3)
         self._fine = grid.directions(_SUBSAMPLES)
-        self._rows = _radiance_rows(reconstruct(scene.probe.slab, scene.probe.frequencies), self._directions)
+        self._sheet = SheetLight(scene.probe, grid)
 
     def compare(self, lights: Sequence[tuple[str, Environment]]) -> Iterator[ComparedLight]:
         """Measure every light with every probe.
@@ -106,8 +104,7 @@ class Comparison:
         lighting = self._scene.estimate(self._scene.photograph(lit.sheet_picture))
         if lighting is None:
             raise FigureError(f"{lit.name}: the sheet was not found in its own picture; choose another environment")
-        radiance = self._rows @ pack_real(lighting.coefficients)
-        return radiance.reshape(_ROWS, 2 * _ROWS, 3).astype(np.float32)
+        return self._sheet.radiance(lighting)
 
     def _captured(self, photographs: list[Photograph], finish: Finish) -> CapturedBall:
         """The ball where it is known to stand; its contour is still taken from the picture."""
@@ -118,11 +115,3 @@ class Comparison:
         (x, y), radius_px = outline.circle_px(scene.camera)
         settings, circle = CaptureSettings(allow_clipped=True), (float(x), float(y), radius_px)
         return capture_ball(photographs, scene.probe, scene.camera, 1.0, settings, circle)
-
-
-def _radiance_rows(reconstruction: Reconstruction, directions: Array) -> Array:
-    """Rows (n, m) of the reconstructed radiance, a part at a time: the prior between all directions is large."""
-    parts = [
-        reconstruction.radiance_rows(directions[start : start + _CHUNK]) for start in range(0, len(directions), _CHUNK)
-    ]
-    return np.concatenate(parts)

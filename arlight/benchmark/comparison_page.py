@@ -44,8 +44,8 @@ def draw_comparison(lights: Sequence[ComparedLight], pose: Pose) -> Figure:
     """
     page = Figure(figsize=(12.0, 9.4), layout="constrained", facecolor="white")
     page.suptitle(f"Planar sheet, mirrored ball and matte ball under the same {len(lights)} lights", fontsize=13)
-    above, below = page.subfigures(2, 1, height_ratios=[4.2, 5.2])
-    panels = above.subplots(1, len(MATERIALS), sharey=True)
+    above, below = page.subfigures(2, 1, height_ratios=[4.2, 5.2], squeeze=False)[:, 0]
+    panels = above.subplots(1, len(MATERIALS), sharey=True, squeeze=False)[0]
     for number, (axes, material) in enumerate(zip(panels, MATERIALS, strict=True)):
         _draw_errors(axes, lights, number, material)
     panels[0].set_ylabel("relighting error\n(rms, relative to the true appearance)", fontsize=9)

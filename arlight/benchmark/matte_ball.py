@@ -17,7 +17,7 @@ _COSINE_LOBE = np.array([np.pi] + [2.0 * np.pi / 3.0] * 3 + [np.pi / 4.0] * 5)
 _USED_RADIUS = 0.96
 """Share of the outline's angle within which shading is used."""
 _MOST_PIXELS = 6000
-_RIDGE = 1e-4
+_RIDGE = 1e-6
 
 
 def matte_ball_light(picture: BallPicture, reflectance: float) -> Array:

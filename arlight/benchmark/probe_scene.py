@@ -24,11 +24,8 @@ from arlight.video.frame import Frame
 
 MIRROR_REFLECTANCE, MATTE_REFLECTANCE = 0.7, 0.5
 _WHITE = 0.6
-_BALL_RADIUS_MM = 32.0
-_GAP_MM = 22.0
-"""Between sheet and ball."""
-_BEFORE_MM = 30.0
-"""How far the balls stand before the sheet's middle."""
+_BALL_RADIUS, _GAP, _BEFORE = 0.17, 0.115, 0.16
+"""Radius of the ball, its distance from the sheet and from its middle line; shares of the sheet's width."""
 _TILT_DEG = 40.0
 _SHEET_WIDTH_PX = 520.0
 _STEP = 4.0
@@ -88,10 +85,11 @@ class ProbeScene:
 
     def ball(self, finish: Finish) -> Ball:
         """The ball right of the sheet, resting on the table."""
-        x = self.probe.sheet_mm[0] / 2.0 + _GAP_MM + _BALL_RADIUS_MM
-        center = (x, -_BEFORE_MM, _BALL_RADIUS_MM - self.probe.glass_mm)
+        width = self.probe.sheet_mm[0]
+        radius = _BALL_RADIUS * width
+        center = ((0.5 + _GAP) * width + radius, -_BEFORE * width, radius - self.probe.glass_mm)
         reflectance = MIRROR_REFLECTANCE if finish == "mirror" else MATTE_REFLECTANCE
-        return Ball(center, _BALL_RADIUS_MM, finish, reflectance)
+        return Ball(center, radius, finish, reflectance)
 
     def with_ball(self, scene: LitScene, finish: Finish) -> NDArray[np.float32]:
         """(h, w, 3) linear radiance of the scene with a ball beside the sheet."""

@@ -80,7 +80,7 @@ def run(options: FiguresOptions) -> int:
         scene.close()
     console = Console(soft_wrap=True, highlight=False, markup=False)
     # a row is one line, also where the output is a file
-    console.print(table, width=max(console.width, _TABLE_WIDTH))
+    Console(width=max(console.width, _TABLE_WIDTH), highlight=False, markup=False).print(table)
     for path in _write(outputs, page, numbers):
         console.print(f"  {path}")
     return 0
