@@ -17,6 +17,12 @@ STEPS = np.array([1e-3, 1e-3, 1e-3, 0.05])
 """Steps over which the response is linear in a correction."""
 
 
+_FREEDOM = 4.0
+"""Degrees of freedom of the Student-t distribution of corrections."""
+_NARROWEST = 0.1
+"""A learnt spread is not less than this share of the widest."""
+
+
 @dataclass(frozen=True, slots=True)
 class CorrectionPrior:
     """How far single blocks stray from the layers' model: standard deviations of independent normal errors."""
@@ -38,20 +44,26 @@ class CorrectionPrior:
 
 def learnt_prior(
     prior: CorrectionPrior, corrections: Array, variance: Array, widest: CorrectionPrior
-) -> CorrectionPrior:
+) -> tuple[CorrectionPrior, Array]:
     """How far this sheet's blocks stray: the spread under which the corrections that were found are most likely.
 
-    A damped step of MacKay's evidence update, which divides by the number of well-determined corrections.
+    A damped step of MacKay's evidence update, which divides by the number of well-determined corrections; a few blocks
+    that are spoilt are let go, as outliers of a Student-t distribution, rather than widen everybody's prior.
 
     Args:
         prior: the spread that the corrections were found with.
         corrections: (blocks, 4); variance: (blocks, 4) of their errors.
         widest: limit of the spread; a tenth of it is the other.
+
+    Returns:
+        The spread, and (blocks, 4) what it comes to for each correction.
     """
-    determined = np.sum(np.clip(1.0 - variance / prior.stddev**2, 0.02, 1.0), axis=0)
-    spread = np.sqrt(np.sum((corrections - MODEL) ** 2, axis=0) / determined)
-    damped = np.clip(np.sqrt(spread * prior.stddev), 0.1 * widest.stddev, widest.stddev)
-    return CorrectionPrior(*map(float, damped))
+    squared = (corrections - MODEL) ** 2
+    weight = (_FREEDOM + 1.0) / (_FREEDOM + squared / prior.stddev**2)
+    determined = np.sum(np.clip(1.0 - variance * weight / prior.stddev**2, 0.02, 1.0), axis=0)
+    spread = np.sqrt(np.sum(weight * squared, axis=0) / determined)
+    damped = np.clip(np.sqrt(spread * prior.stddev), _NARROWEST * widest.stddev, widest.stddev)
+    return CorrectionPrior(*map(float, damped)), damped / np.sqrt(weight)
 
 
 def corrections_of(assembly: Assembly, count: int) -> Array:

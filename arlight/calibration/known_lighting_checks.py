@@ -24,7 +24,7 @@ LEAST_LIGHTINGS = 2
 _ALIKE = 0.02
 """Second singular value of the lights' coefficients, relative to the first, below which they are one light."""
 _MISMATCH = 0.12
-"""Error of orders 1 and 2, relative to L~_0, that only frames under another light have."""
+"""Error of orders 1 and 2 in green, relative to L~_0, that only frames under another light have."""
 _BRIGHTNESS_MISMATCH = 0.3
 """The same for order 0 where exposures are known: that the sheet's own gain is this far off is hardly possible."""
 _HINT = 0.6
@@ -41,7 +41,7 @@ class LightingError:
     orders: Array
     """(order + 1,) median over its views of each order's error, relative to |L~_0|."""
     shape: float
-    """Median over its views of the error of orders 1 and 2 when the estimate is scaled to the light's L~_0."""
+    """Median over its views of the error of orders 1 and 2 in green, estimate and light scaled to L~_0 = 1."""
     estimate: ComplexArray
     """(k, 3) the coefficients that its first view told."""
 
@@ -178,8 +178,11 @@ def _hint(error: LightingError, own: float, number: int, lights: Sequence[KnownL
 
 
 def _shape_error(found: ComplexArray, truth: ComplexArray, frequencies: NDArray[np.int64]) -> float:
-    scaled = found * (truth[0].real / np.where(np.abs(found[0]) > 0.0, found[0].real, 1.0))
-    return float(np.sqrt(np.mean(order_errors(scaled, truth, frequencies)[1:3] ** 2)))
+    """Error of orders 1 and 2 in green, the channel that every video keeps, when both are scaled to L~_0 = 1."""
+    shown, known = (
+        light[:, 1:2] / np.where(np.abs(light[0, 1]) > 0.0, light[0, 1].real, 1.0) for light in (found, truth)
+    )
+    return float(np.sqrt(np.mean(order_errors(shown, known, frequencies)[1:3] ** 2)))
 
 
 def _relative(light: KnownLight, probe: Probe) -> Array:

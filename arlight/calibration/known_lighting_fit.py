@@ -111,6 +111,7 @@ class KnownLightingFit:
         """How far blocks stray from the layers' model."""
         self._relative = relative
         self._widest = prior
+        self._spread: Array | None = None
         self._block_variance: Array = np.zeros((0, len(MODEL)))
 
     def step(
@@ -125,7 +126,7 @@ class KnownLightingFit:
 
     def learn_prior(self, unknowns: Unknowns) -> None:
         """Take over how far this sheet's blocks stray from the model, after a step."""
-        self.prior = learnt_prior(self.prior, unknowns.blocks, self._block_variance, self._widest)
+        self.prior, self._spread = learnt_prior(self.prior, unknowns.blocks, self._block_variance, self._widest)
 
     def normal(
         self, unknowns: Unknowns, views: list[LitView], highest_order: int = 8, tolerance: float = 0.0
@@ -183,7 +184,8 @@ class KnownLightingFit:
         usual = np.zeros_like(unknowns.views)
         usual[:, 0] = [view.sheet.blur_px**2 for view in views]
         away = [EXPECTED - unknowns.layers, (usual - unknowns.views).ravel(), (MODEL - unknowns.blocks).ravel()]
-        stddev = [LAYER_STDDEV, np.tile(VIEW_STDDEV, len(views)), np.tile(self.prior.stddev, places.blocks)]
+        blocks = np.tile(self.prior.stddev, places.blocks) if self._spread is None else self._spread.ravel()
+        stddev = [LAYER_STDDEV, np.tile(VIEW_STDDEV, len(views)), blocks]
         if self._relative:
             # about the start, which the pictures gave: only a guard against lights that were never seen
             away.insert(1, np.zeros(3 * places.lightings))

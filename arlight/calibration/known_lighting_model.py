@@ -32,6 +32,8 @@ LAYER_STDDEV = np.append(layer_parameters.STDDEV, 0.15)
 LAYER_STDDEV[[NAMES.index("gradient_x"), NAMES.index("gradient_y")]] = 1e-6
 VIGNETTING = (NAMES.index("vignetting_k1"), NAMES.index("vignetting_k2"))
 _LOWER_FACE = NAMES.index("lower_face")
+_NOT_OF_THE_SHEET = ("vignetting_k1", "vignetting_k2", "lower_face", "gradient_x", "gradient_y")
+"""Parameters that leave the stack as it is."""
 
 VIEW_STEPS = np.array([1e-3, 1e-4, 1e-4, 1e-4, 1e-4])
 """Steps of a view's unknowns."""
@@ -81,16 +83,34 @@ class ViewPrediction:
 class SheetModel:
     """One trial assembly under the known lights."""
 
-    def __init__(self, probe: Probe, lights: Sequence[KnownLight], unknowns: Unknowns) -> None:
-        """Solve the stack, and take the lights' coefficients at the frequencies that it measures."""
+    def __init__(
+        self,
+        probe: Probe,
+        lights: Sequence[KnownLight],
+        unknowns: Unknowns,
+        *,
+        echoes: bool = True,
+        sheet: PredictedSheet | None = None,
+    ) -> None:
+        """Solve the stack, and take the lights' coefficients at the frequencies that it measures.
+
+        Args:
+            probe: the sheet as designed.
+            lights: the lights by number.
+            unknowns: the trial.
+            echoes: follow light that goes back and forth inside the glass.
+            sheet: of another trial with the same assembly, where there is one.
+        """
         assembly = unknowns.assembly
-        self._sheet = PredictedSheet(probe, assembly)
+        self.sheet = sheet or PredictedSheet(probe, assembly, echoes=echoes)
+        """The stack."""
+        self._echoes = echoes
         self._cycles = BlockLayout.of_probe(probe, assembly).cycles_per_mm
         self._tilted_mm = assembly.slab(probe).glass_mm / probe.refractive_index
         self._lower_face = float(unknowns.layers[_LOWER_FACE])
         self._vignetting = unknowns.vignetting
         frequencies = measured_frequencies(probe, assembly)
-        self._coefficients = [light.packed(frequencies)[self._sheet.response.places] for light in lights]
+        self._packed = [light.packed(frequencies) for light in lights]
 
     def predict(self, view: LitView, own: Array, exposure: Array) -> ViewPrediction:
         """Rows of a view.
@@ -100,17 +120,28 @@ class SheetModel:
             own: (5,) unknowns of the view.
             exposure: (3,) factor on the light's radiance.
         """
-        rows, lower = self._sheet.rows(self._turned(view.sheet, own[3:5]))
         transfer = optical_transfer(view.sheet.means.cycles_per_px, float(own[0]))
-        light = self._coefficients[view.sheet.light] * exposure
+        lit, lower = self._lit(self._turned(view.sheet, own[3:5]))
         mirror = self._lower_face * lower * transfer
         mirror[:, 0] += 1.0
         mirrored = view.mirrored * exposure
-        shown = np.einsum("brk,bkc->brc", rows, light) * transfer[..., None] + mirror[..., None] * mirrored[:, None]
+        shown = lit * exposure * transfer[..., None] + mirror[..., None] * mirrored[:, None]
         squared = view.sheet.radius_squared
         gain = 1.0 + squared * (self._vignetting[0] + squared * self._vignetting[1])
         shown = turned_rows(shown, 2.0 * np.pi * self._cycles @ own[1:3]) * gain[:, None, None]
         return ViewPrediction(shown, mirror * gain[:, None], mirrored)
+
+    def _lit(self, sheet: SheetView) -> tuple[Array, Array]:
+        """Rows (blocks, 7, 3) of the light, and (blocks, 7) of the lower face's mirror reflection."""
+        packed, places = self._packed[sheet.light], self.sheet.response.places
+        if not self._echoes:
+            rows, lower = self.sheet.rows(sheet)
+            return np.einsum("brk,bkc->brc", rows, packed[places]), lower
+        lit = []
+        for light in packed.T:
+            rows, lower = self.sheet.rows(sheet, light / light[0])
+            lit.append(np.einsum("brk,bk->br", rows, light[places]))
+        return np.stack(lit, axis=-1), lower
 
     def _turned(self, sheet: SheetView, tilt: Array) -> SheetView:
         """The view from a slightly other direction."""
@@ -121,18 +152,24 @@ class SheetModel:
 
 
 class Linearisation:
-    """Predictions about a trial, with one-sided differences; everything that views share is prepared once."""
+    """Predictions about a trial, with one-sided differences; everything that views share is prepared once.
+
+    What the unknowns change in the glass's echoes is far below what the differences need.
+    """
 
     def __init__(self, probe: Probe, lights: Sequence[KnownLight], unknowns: Unknowns) -> None:
         self._at = unknowns
         self._model = SheetModel(probe, lights, unknowns)
-        layers, blocks = unknowns.layers, unknowns.blocks
+        self._base = SheetModel(probe, lights, unknowns, echoes=False)
+        layers = [replace(unknowns, layers=unknowns.layers + change) for change in np.diag(LAYER_STEPS)]
+        blocks = [replace(unknowns, blocks=unknowns.blocks + change) for change in np.diag(BLOCK_STEPS)]
         self._layers = [
-            SheetModel(probe, lights, replace(unknowns, layers=layers + change)) for change in np.diag(LAYER_STEPS)
+            SheetModel(
+                probe, lights, trial, echoes=False, sheet=self._base.sheet if name in _NOT_OF_THE_SHEET else None
+            )
+            for name, trial in zip(NAMES, layers, strict=True)
         ]
-        self._blocks = [
-            SheetModel(probe, lights, replace(unknowns, blocks=blocks + change)) for change in np.diag(BLOCK_STEPS)
-        ]
+        self._blocks = [SheetModel(probe, lights, trial, echoes=False) for trial in blocks]
 
     def predict(self, view: LitView, number: int) -> ViewPrediction:
         """Prediction of the view of that number."""
@@ -146,7 +183,7 @@ class Linearisation:
             (blocks, 7, 3, 4): with the block's own corrections.
         """
         own, exposure = self._at.views[number], self._at.exposures[view.sheet.light]
-        base = self.predict(view, number).rows
+        base = self._base.predict(view, own, exposure).rows
 
         def slopes(models: list[SheetModel], steps: Array) -> list[Array]:
             return [
@@ -156,7 +193,7 @@ class Linearisation:
 
         shared = slopes(self._layers, LAYER_STEPS)
         for change, step in zip(np.diag(VIEW_STEPS), VIEW_STEPS, strict=True):
-            shared.append((self._model.predict(view, own + change, exposure).rows - base) / step)
+            shared.append((self._base.predict(view, own + change, exposure).rows - base) / step)
         return np.stack(shared, axis=-1), np.stack(slopes(self._blocks, BLOCK_STEPS), axis=-1)
 
 
