@@ -84,7 +84,8 @@ def _printed(raster: Image, printing: Print, per_mm: float, halftone: bool) -> I
     tone = printing.tone(raster)
     if halftone:
         clear = (tone - printing.solid) / (1.0 - printing.solid)
-        tone = printing.solid + (1.0 - printing.solid) * halftoned(clear.astype(np.float32))
+        dots = halftoned(clear.astype(np.float32)).astype(float)
+        tone = printing.solid + (1.0 - printing.solid) * dots
     image = tone.astype(np.float32)
     if printing.blur_mm > 0.0:
         image = np.asarray(

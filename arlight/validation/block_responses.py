@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,17 +11,21 @@ from arlight.environment import Environment
 from arlight.errors import ArlightError, OutputError
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Design, Probe
+from arlight.probe.layout import design_probe
 from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import ROWS, BlockMeans
 from arlight.validation.assembled_layers import assembled_layers
 from arlight.validation.camera_view import LitSheet
 from arlight.validation.paper_light import GatherSettings, gather_irradiance
+from arlight.validation.proof_lights import KNOWN_LIGHTS, TEST_LIGHTS, proof_light
 
 Array = NDArray[np.float64]
 
 TILTS_DEG = (0.0, 15.0, 35.0, 55.0, 70.0)
 AZIMUTHS_DEG = (-90.0, -37.0, 24.0, 161.0, 75.0)
 """Where the viewer of each tilt stands; not along the stripes."""
+RESPONSE_LIGHTS = ("hall", "forest", "courtyard", "bridge", "lobby", "sunset")
+"""Captured lights of the stored means."""
 _POINTS_PER_SIDE = 64
 
 
@@ -77,6 +82,28 @@ def trace_responses(
     means = np.stack(halves).reshape(2, len(views), -1, len(environments), 3).swapaxes(2, 3)
     spread = np.abs(means[0] - means[1]) / 2.0
     return TracedResponses(probe.design, probe.order, views, coefficients, means.mean(axis=0), spread)
+
+
+def trace_proof_responses(design: Design, captured: Path) -> TracedResponses:
+    """Block means of the default sheet of order 5 under six soft captured lights from five views.
+
+    Args:
+        design: of the sheet.
+        captured: folder of the captured environments.
+
+    Raises:
+        ValidationUnavailableError: Mitsuba is not there.
+        EnvironmentMapError: an environment is missing.
+    """
+    probe = design_probe(design=design)
+    with TemporaryDirectory() as folder:
+        lights = [
+            proof_light(name, (TEST_LIGHTS | KNOWN_LIGHTS)[name], captured, Path(folder), probe.slab, probe)
+            for name in RESPONSE_LIGHTS
+        ]
+    coefficients = np.stack([light.coefficients for light in lights])
+    settings = GatherSettings(12, 10, 8)
+    return trace_responses(probe, [light.environment for light in lights], coefficients, views_of(), settings)
 
 
 def window_means(probe: Probe, sheet: LitSheet, toward: Array) -> Array:

@@ -98,6 +98,7 @@ def set_stage(
     assembly: Assembly | None = None,
     lights: dict[str, float] | None = None,
     settings: GatherSettings | None = None,
+    halftone_dpi: float | None = 600.0,
 ) -> ProofStage:
     """Write lights, probe.json, camera.json and assembly.json, and gather the light in the sheet.
 
@@ -107,6 +108,7 @@ def set_stage(
         assembly: how the sheet was assembled; `assembled_by_hand` by default.
         lights: which lights, and how far each is turned [deg]; all twelve by default.
         settings: how densely the light is gathered.
+        halftone_dpi: resolution of the bilevel printer; None for continuous tone.
 
     Raises:
         ValidationUnavailableError: Mitsuba is not there.
@@ -118,7 +120,7 @@ def set_stage(
     save_setting(folder, probe, camera, assembly)
     target = folder / "lights"
     target.mkdir(exist_ok=True)
-    layers = assembled_layers(probe, assembly, halftone_dpi=None if assembly == Assembly() else 600.0)
+    layers = assembled_layers(probe, assembly, halftone_dpi)
     turns = TEST_LIGHTS | KNOWN_LIGHTS if lights is None else lights
     known = [proof_light(name, turn, captured, target, layers.slab, probe) for name, turn in turns.items()]
     _describe(target, known)
@@ -142,7 +144,7 @@ def trace_proof(folder: Path, captured: Path, report: Report) -> None:
         _tell(report, stage.film_path(folder, path))
     for make in (stage.film_known, stage.film_fixed, stage.film_control):
         _tell(report, make(folder))
-    perfect = set_stage(folder / "perfect", captured, Assembly(), TEST_LIGHTS)
+    perfect = set_stage(folder / "perfect", captured, Assembly(), TEST_LIGHTS, halftone_dpi=None)
     _tell(report, [f"perfect/{name}" for name in perfect.film_path(folder / "perfect", "orbit")])
 
 

@@ -1,8 +1,6 @@
 """Path-traced clips on disk: NAME.mp4, its truth, the assembled sheet's truth, and shared probe and camera files."""
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.errors import OutputError
 from arlight.probe.assembly import Assembly
+from arlight.probe.assembly_storage import save_assembly
 from arlight.probe.design import Probe
 from arlight.probe.storage import save_probe
 from arlight.synthetic.truth import ClipTruth, FrameTruth, save_truth
@@ -87,7 +86,7 @@ def save_setting(folder: Path, probe: Probe, camera: Camera, assembly: Assembly)
         folder.mkdir(parents=True, exist_ok=True)
         save_probe(probe, folder / "probe.json")
         camera.save(folder / "camera.json")
-        (folder / "assembly.json").write_text(json.dumps(asdict(assembly), indent=1) + "\n", encoding="utf-8")
+        save_assembly(assembly, folder / "assembly.json")
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from error
 

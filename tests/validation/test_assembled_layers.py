@@ -65,7 +65,7 @@ def test_a_shift_turns_the_phase_and_leaves_the_amplitude():
     (before, amplitude), (after, moved_amplitude) = (phase_of(s, s.film, PATTERN) for s in (plain, moved))
     turn = np.angle(np.exp(1j * (after - before)))
     assert turn == pytest.approx(-2 * np.pi * shift / PROBE.slab.period_mm, abs=2e-3)
-    assert moved_amplitude == pytest.approx(amplitude, rel=2e-3)
+    assert moved_amplitude == pytest.approx(amplitude, rel=5e-3)
 
 
 def test_halftoning_and_blur_keep_the_pattern_but_for_the_blurs_loss():
