@@ -141,7 +141,5 @@ def lit_sheet() -> LitSheet:
     renderer.release()
     place = {block.id: number for number, block in enumerate(field_blocks(probe))}
     kinds = (("gain", GAIN), ("phase_deg", PHASE_DEG), ("modulation", MODULATION))
-    spoilt = {
-        kind: (place[block.id], value) for block, (kind, value) in zip(spoilt_blocks(probe), kinds, strict=True)
-    }
+    spoilt = {kind: (place[block.id], value) for block, (kind, value) in zip(spoilt_blocks(probe), kinds, strict=True)}
     return LitSheet(probe, camera, ASSEMBLY, lights, seen, beside, spoilt)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from arlight.calibration.known_lighting import KnownLightingCalibration, calibrate_known
+from arlight.calibration.known_lighting_checks import check_match
 from arlight.calibration.known_lighting_light import KnownLight
 from arlight.errors import CalibrationError
 from arlight.tracking.block_layout import field_blocks
+
 
 def calibrated(sheet, lights=None, seen=None, **options) -> KnownLightingCalibration:
     return calibrate_known(seen or sheet.seen, lights or sheet.lights, sheet.probe, sheet.camera, **options)
@@ -73,15 +75,6 @@ def test_two_lightings_do_for_many_blocks(lit_sheet):
     np.testing.assert_allclose(shift, lit_sheet.assembly.paper.registration.shift_mm, atol=0.015)
 
 
-def test_the_order_of_lightings_does_not_matter(lit_sheet, result):
-    lights, seen = chosen(lit_sheet, [2, 0, 1])
-    found = calibrated(lit_sheet, lights, seen)
-    assert [error.name for error in found.errors] == [result.errors[number].name for number in (2, 0, 1)]
-    for name, value in result.values.items():
-        assert found.values[name] == pytest.approx(value, abs=0.02 * max(result.stddev[name], 1e-9)), name
-    np.testing.assert_allclose(found.assembly.blocks.phase_deg, result.assembly.blocks.phase_deg, atol=0.01)
-
-
 def test_open_brightness_is_found_and_leaves_the_layers(lit_sheet, result):
     dimmed = [replace(light, environment=light.environment.scaled(0.25)) for light in lit_sheet.lights]
     found = calibrated(lit_sheet, dimmed, relative=True)
@@ -97,10 +90,19 @@ def test_swapped_environments_are_refused_and_recognised(lit_sheet):
         calibrated(lit_sheet, swapped)
 
 
-def test_a_brightness_that_cannot_be_is_refused(lit_sheet):
-    bright = replace(lit_sheet.lights[2], environment=lit_sheet.lights[2].environment.scaled(3.0))
-    with pytest.raises(CalibrationError, match="--relative"):
-        calibrated(lit_sheet, [*lit_sheet.lights[:2], bright])
+def test_a_brightness_that_cannot_be_is_refused_unless_it_is_open(lit_sheet, result):
+    bright = replace(result.errors[1], orders=np.array([0.5, 0.02, 0.02]))
+    errors = [result.errors[0], bright, result.errors[2]]
+    check_match(errors, lit_sheet.lights, lit_sheet.probe, relative=True)
+    with pytest.raises(CalibrationError, match=r"light1.*50 %.*--relative"):
+        check_match(errors, lit_sheet.lights, lit_sheet.probe, relative=False)
+
+
+def test_a_turned_environment_is_recognised(lit_sheet, result):
+    turned = replace(lit_sheet.lights[2], environment=lit_sheet.lights[2].environment.rotated(np.deg2rad(-90.0)))
+    errors = [*result.errors[:2], replace(result.errors[2], shape=0.4)]
+    with pytest.raises(CalibrationError, match=r"light2.*turned by another \+90 degrees"):
+        check_match(errors, [*lit_sheet.lights[:2], turned], lit_sheet.probe, relative=False)
 
 
 def test_one_lighting_is_refused(lit_sheet):
