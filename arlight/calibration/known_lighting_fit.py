@@ -81,13 +81,16 @@ class Normal:
     """(u,) prior's right-hand side."""
     squared: Array
     """(views, blocks) mean normalised squared residual of the stripes."""
+    views: NDArray[np.int64]
+    """(lightings,) how many views each lighting has."""
 
     def solve(self, without: int | None = None) -> tuple[Array, Array]:
         """Step (u,) and its covariance (u, u), without the views of one lighting where that is asked for."""
         kept = [i for i in range(len(self.matrices)) if i != without]
-        matrix = self.matrices[kept].sum(axis=0) + np.diag(self.prior)
-        covariance = np.linalg.inv(matrix)
-        return covariance @ (self.right[kept].sum(axis=0) + self.pull), covariance
+        # a view counts for more when there are fewer
+        factor = np.sqrt(self.views.sum() / max(int(self.views[kept].sum()), 1))
+        covariance = np.linalg.inv(factor * self.matrices[kept].sum(axis=0) + np.diag(self.prior))
+        return covariance @ (factor * self.right[kept].sum(axis=0) + self.pull), covariance
 
 
 class KnownLightingFit:
@@ -157,7 +160,8 @@ class KnownLightingFit:
                     single[:, :, channel], weighted.precision[channel] / repeated, weighted.residual[..., channel],
                 )  # fmt: skip
         inverse_variance, pull = self._priors(unknowns, views, places)
-        return Normal(matrices, right, inverse_variance, pull, squared)
+        count = np.bincount([view.sheet.light for view in views], minlength=len(self._lights))
+        return Normal(matrices, right, inverse_variance, pull, squared, count)
 
     def moved(self, unknowns: Unknowns, change: Array) -> Unknowns:
         """The unknowns after a step (u,), within their limits."""

@@ -123,8 +123,8 @@ def _lights(options: CalibrateKnownOptions, probe: Probe) -> tuple[list[KnownLig
     lights = []
     for path, yaw, exposure in distinct:
         environment = Environment.load(path).rotated(float(np.deg2rad(yaw))).scaled(exposure)
-        frames = [str(frame) for frame, key in zip(options.frames, keys, strict=True) if key == (path, yaw, exposure)]
-        lights.append(KnownLight(f"{', '.join(frames)} under {path}", environment, probe.refractive_index))
+        frames = [frame.name for frame, key in zip(options.frames, keys, strict=True) if key == (path, yaw, exposure)]
+        lights.append(KnownLight(f"{', '.join(frames)} ({path.name})", environment, probe.refractive_index))
     return lights, [distinct.index(key) for key in keys]
 
 
