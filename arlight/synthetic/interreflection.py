@@ -20,8 +20,9 @@ Image = NDArray[np.float32]
 class Interreflection:
     """Operator from the paper's irradiance to what the glass returns of it."""
 
-    film: Image
-    """(rows, columns) transmittance of the film, 0 under the frame."""
+    film_squared: Image
+    """(rows, columns) transmittance of the film crossed twice at the same point, 0 under the frame. Of dots that are
+    finer than the samples this is not the square of what they let through once."""
     paper: Image
     """(rows, columns) reflectance of the paper."""
     slab: Slab
@@ -43,12 +44,8 @@ class Interreflection:
         radiosity = np.ascontiguousarray(irradiance * self.paper, dtype=np.float32)
         shifts, weights = self._quadrature
         returned = np.empty_like(radiosity)
-        _returned_by_upper_face(radiosity, self._film_squared, shifts, weights, returned)
+        _returned_by_upper_face(radiosity, self.film_squared, shifts, weights, returned)
         return returned + np.float32(diffuse_reflectance(self.slab)) * radiosity
-
-    @cached_property
-    def _film_squared(self) -> Image:
-        return np.ascontiguousarray(self.film**2, dtype=np.float32)
 
     @cached_property
     def _quadrature(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

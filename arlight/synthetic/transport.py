@@ -1,7 +1,9 @@
 """Light transport from a distant environment through the film to the paper, for the actual printed layers.
 
-The irradiance of the paper does not depend on the viewer: E(p) = sum over lights of l T d omega^N film(p + D(w)), a
-correlation, computed exactly in band by FFT. No closed form of the patterns is used, so estimates can be tested on it.
+The irradiance of the paper does not depend on the viewer. What comes straight, the sum over lights of
+l (1 - R)^2 d omega^N film(p + D(w)), is a correlation, computed exactly in band by FFT; what goes back and forth in the
+glass is added light by light, and what returns from the paper bounce by bounce. No closed form of the patterns is used,
+so estimates can be tested on it.
 """
 
 from dataclasses import dataclass
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from arlight.environment import Environment
 from arlight.optics import Slab
+from arlight.synthetic.echoes import SlabEchoes
 from arlight.synthetic.interreflection import Interreflection
 from arlight.synthetic.sheet import SheetLayers
 
@@ -46,17 +49,21 @@ class LightTransport:
     slab: Slab
     """The glass between film and paper."""
     bounces: int = 3
-    """How often light returned to the paper by the glass is followed; 0 for single scattering."""
+    """How often light returned to the paper by the glass is followed; 0 for single scattering, in which T counts what
+    goes back and forth in the glass as if it came straight."""
 
     def irradiance(self, environment: Environment) -> IrradianceMap:
         """Irradiance of the paper [radiance * sr] under an environment; linear in its radiance."""
         directions, light = environment.samples()
         cosine = directions[:, 2]
-        received = light * (cosine * self.slab.transmittance(cosine))[:, None]
+        straight = (1.0 - self.slab.interface_reflectance(cosine)) ** 2
+        received = light * (cosine * (straight if self.bounces else self.slab.transmittance(cosine)))[:, None]
         kernel = _light_spectrum(
             self.slab.offset_mm(directions), received, self.slab.max_offset_mm, self._frequencies_per_mm
         )
         planes = np.stack([self._correlate(channel) for channel in kernel])
+        if self.bounces:
+            planes += self._echoes.irradiance(directions, light)
         np.maximum(planes, 0.0, out=planes)
         if self.bounces:
             planes = self._interreflection.total_irradiance(planes, self.bounces)
@@ -123,6 +130,14 @@ class LightTransport:
         full = scipy.fft.irfft2(self._film_spectrum * kernel, s=self._padded_shape, workers=WORKERS)
         return full[:rows, :columns]
 
+    @cached_property
+    def _film(self) -> Image:
+        return self._coarse(self.layers.film)
+
+    @cached_property
+    def _film_squared(self) -> Image:
+        return self._coarse(self.layers.film**2)
+
     def _coarse(self, layer: Image) -> Image:
         rows, columns = self._grid_shape
         full = scipy.fft.irfft2(self._spectrum(layer), s=self._padded_shape, workers=WORKERS)
@@ -131,11 +146,15 @@ class LightTransport:
     @cached_property
     def _interreflection(self) -> Interreflection:
         return Interreflection(
-            film=self._coarse(self.layers.film),
+            film_squared=self._film_squared,
             paper=self._coarse(self.layers.paper),
             slab=self.slab,
             texel_mm=self._step / self.layers.pixels_per_mm,
         )
+
+    @cached_property
+    def _echoes(self) -> SlabEchoes:
+        return SlabEchoes(self._film, self._film_squared, self.slab, self._step / self.layers.pixels_per_mm)
 
 
 def _fade(cycles_per_sample: Array) -> NDArray[np.float32]:

@@ -38,7 +38,7 @@ def test_returned_light_equals_traced_rays():
     film = (0.95 * (0.5 + 0.5 * np.cos(2 * np.pi * x / 4.26))).astype(np.float32)
     paper = (0.9 * (0.5 + 0.5 * np.cos(2 * np.pi * (x + y) / 3.0))).astype(np.float32)
     irradiance = np.stack([1 + 0.3 * np.sin(x), np.ones_like(x), 1 + 0.2 * np.cos(y)]).astype(np.float32)
-    found = Interreflection(film, paper, SLAB, TEXEL_MM).returned(irradiance)
+    found = Interreflection(film**2, paper, SLAB, TEXEL_MM).returned(irradiance)
     for row, column in generator.integers(70, 110, (12, 2)):
         expected = monte_carlo(film, irradiance * paper, row, column, generator)
         # 3 % of the light that comes back is 0.3 % of the light on the paper
@@ -51,7 +51,7 @@ def test_bounces_converge_to_the_geometric_series():
     angle = np.arcsin(np.sqrt(generator.uniform(0, 1, 1_000_000)))
     face = fresnel(angle)
     once = 0.9 * (face.mean() + 0.95**2 * (face * (1 - face) ** 2).mean())
-    glass = Interreflection(film, paper, SLAB, TEXEL_MM)
+    glass = Interreflection(film**2, paper, SLAB, TEXEL_MM)
     direct = np.ones((3, 140, 140), np.float32)
     middle = [glass.total_irradiance(direct, bounces)[1, 70, 70] for bounces in range(5)]
     # the grid's rim is dark: two bounces do not reach it from the middle, later ones hardly
@@ -67,7 +67,7 @@ def test_returned_light_is_linear_and_does_not_create_energy():
     generator = np.random.default_rng(2)
     film = generator.uniform(0, 0.95, (60, 70)).astype(np.float32)
     paper = generator.uniform(0, 0.9, (60, 70)).astype(np.float32)
-    glass = Interreflection(film, paper, SLAB, TEXEL_MM)
+    glass = Interreflection(film**2, paper, SLAB, TEXEL_MM)
     a, b = generator.uniform(0, 1, (2, 3, 60, 70)).astype(np.float32)
     np.testing.assert_allclose(glass.returned(a + b), glass.returned(a) + glass.returned(b), atol=1e-6)
     assert glass.returned(a).sum() < 0.2 * (a * paper).sum()
@@ -75,7 +75,7 @@ def test_returned_light_is_linear_and_does_not_create_energy():
 
 def test_black_paper_returns_nothing():
     film = np.full((30, 30), 0.95, np.float32)
-    glass = Interreflection(film, np.zeros((30, 30), np.float32), SLAB, TEXEL_MM)
+    glass = Interreflection(film**2, np.zeros((30, 30), np.float32), SLAB, TEXEL_MM)
     assert glass.returned(np.ones((3, 30, 30), np.float32)).max() == 0.0
 
 

@@ -92,6 +92,22 @@ def paper_light(environment, points):
     return film_at(x, y) @ received
 
 
+def seen_in_glass(environment, q, step, face, mirrored):
+    """Follow the viewer's rays down through the film, from face to face, until next to nothing is left of them."""
+    total, carried, at = np.zeros_like(mirrored), 1 - face, q
+    while carried.max() > 1e-5:
+        carried = carried * film_at(*at.T)[:, None]
+        at = at - step
+        below = paper_at(*at.T)[:, None] * paper_light(environment, at) / np.pi
+        total += carried * (1 - face) * below
+        carried = carried * face
+        at = at - step
+        carried = carried * film_at(*at.T)[:, None]
+        total += carried * (1 - face) * mirrored
+        carried = carried * face
+    return total
+
+
 def expected_radiance(environment, pose, pixel, generator):
     """Mean over rays through a pixel's square."""
     at = pixel + (np.stack(np.meshgrid(np.arange(20), np.arange(20)), -1).reshape(-1, 2) + 0.5) / 20 - 0.5
@@ -100,19 +116,15 @@ def expected_radiance(environment, pose, pixel, generator):
     centre = pose.camera_centre_mm
     q = centre[:2] - rays[:, :2] * centre[2] / rays[:, 2:]
     view = -rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    step = refracted_step(view)
-    p, opposite = q - step, q - 2 * step
     face = face_reflectance(view[:, 2])[:, None]
-    opening = in_window(q[:, 0], q[:, 1])[:, None]
-    film, film_opposite = film_at(*q.T)[:, None], film_at(*opposite.T)[:, None]
-    through = (1 - face) / (1 + face) / np.pi * film * paper_at(*p.T)[:, None] * paper_light(environment, p)
     mirrored = environment.radiance_at(view * [-1, -1, 1])
-    glass = through + mirrored * (face + (1 - face) ** 2 * face * film * film_opposite)
+    glass = face * mirrored + seen_in_glass(environment, q, refracted_step(view), face, mirrored)
+    opening = in_window(q[:, 0], q[:, 1])[:, None]
     frame = 0.9 * environment.irradiance() / np.pi
     return np.mean(np.where(opening, glass, frame), axis=0)
 
 
-@pytest.mark.parametrize("tilt_deg", [0.0, 48.0, 68.0])
+@pytest.mark.parametrize("tilt_deg", [0.0, 48.0, 68.0, 77.0])
 def test_pixels_equal_rays(tilt_deg):
     environment, generator = smooth_light(), np.random.default_rng(1)
     pose = CameraMotion("still", 130.0, tilt_deg).pose(0.0, CAMERA, (SHEET_MM, SHEET_MM))
@@ -123,7 +135,7 @@ def test_pixels_equal_rays(tilt_deg):
     expected = np.array([expected_radiance(environment, pose, pixel, generator) for pixel in pixels])
     white = 0.9 * environment.irradiance().mean() / np.pi
     # a pixel on the window's edge may differ by what lies between two samples
-    assert np.median(np.abs(found - expected)) < 1e-3 * white
+    assert np.median(np.abs(found - expected)) < 4e-4 * white
     assert np.sqrt(np.mean((found - expected) ** 2)) < 6e-3 * white
 
 
