@@ -1,53 +1,66 @@
 """The `arlight` command: one dataclass of options a subcommand, no logic."""
 
 import sys
-from collections.abc import Callable
-from typing import Annotated, Any
+from importlib import import_module
+from inspect import cleandoc
+from typing import Annotated, Any, Union
 
 import tyro
 from rich.console import Console
 
-from arlight.commands import demo, evaluate, probe, run, synthesize, table
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.errors import ArlightError
 
-Command = (
-    Annotated[run.RunOptions, tyro.conf.subcommand("run")]
-    | Annotated[demo.DemoOptions, tyro.conf.subcommand("demo")]
-    | Annotated[probe.ProbeOptions, tyro.conf.subcommand("probe")]
-    | Annotated[synthesize.SynthesizeOptions, tyro.conf.subcommand("synthesize")]
-    | Annotated[evaluate.EvaluateOptions, tyro.conf.subcommand("evaluate")]
-    | Annotated[table.TableOptions, tyro.conf.subcommand("table")]
-)
-
-_RUN: dict[type, Callable[[Any], int]] = {
-    run.RunOptions: run.run,
-    demo.DemoOptions: demo.run,
-    probe.ProbeOptions: probe.run,
-    synthesize.SynthesizeOptions: synthesize.run,
-    evaluate.EvaluateOptions: evaluate.run,
-    table.TableOptions: table.run,
+COMMANDS = {
+    "run": "RunOptions",
+    "demo": "DemoOptions",
+    "probe": "ProbeOptions",
+    "calibrate": "CalibrateOptions",
+    "ball": "BallOptions",
+    "synthesize": "SynthesizeOptions",
+    "evaluate": "EvaluateOptions",
+    "table": "TableOptions",
+    "figures": "FiguresOptions",
+    "trace": "TraceOptions",
 }
+"""Module below `arlight.commands` and class of options of every subcommand."""
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0, 1 for what the user can mend, 2 for usage, 130 for Ctrl-C."""
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     try:
-        options: Any = tyro.cli(
-            Command,  # type: ignore[arg-type]
-            prog="arlight",
-            args=arguments,
-            description="Light virtual objects in footage with the light that is really there, "
-            "measured from a printed sheet.",
-        )
-        return _RUN[type(options)](options)
+        options = _parsed(sys.argv[1:] if arguments is None else arguments)
+        return int(import_module(type(options).__module__).run(options))
     except ArlightError as error:
         errors.print(f"arlight: {error}")
         return 1
     except KeyboardInterrupt:
         errors.print("arlight: interrupted")
         return INTERRUPTED_EXIT_CODE
+
+
+def _parsed(arguments: list[str]) -> Any:
+    """The options of the subcommand that is named, which alone is loaded; all are for the list of them."""
+    if arguments and arguments[0] in COMMANDS:
+        return tyro.cli(_options(arguments[0]), prog=f"arlight {arguments[0]}", args=arguments[1:])
+    every: Any = Union[tuple(Annotated[_options(name), _listed(name)] for name in COMMANDS)]  # noqa: UP007
+    return tyro.cli(
+        every,
+        prog="arlight",
+        args=arguments,
+        description="Light virtual objects in footage with the light that is really there, "
+        "measured from a printed sheet.",
+    )
+
+
+def _listed(name: str) -> Any:
+    """The subcommand with the first paragraph of what it does."""
+    return tyro.conf.subcommand(name, description=cleandoc(_options(name).__doc__).split("\n\n")[0])
+
+
+def _options(name: str) -> Any:
+    return getattr(import_module(f"arlight.commands.{name}"), COMMANDS[name])
 
 
 if __name__ == "__main__":
