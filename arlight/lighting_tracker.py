@@ -84,6 +84,7 @@ class LightingTracker:
         self._settings = settings or TrackerSettings()
         if self._settings.order is not None:
             orders_up_to(probe.frequencies, self._settings.order)
+        self._radiometry = camera.radiometry
         self._tracker = PoseTracker(probe, camera)
         self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
         self._estimator = LightingEstimator(probe, assembly, bounces=self._settings.bounces)
@@ -108,7 +109,7 @@ class LightingTracker:
 
     def _update(self, frame: Frame) -> FrameEstimate:
         start = perf_counter()
-        codes, table = luma_codes(frame)
+        codes, table = luma_codes(frame, self._radiometry)
         pose = self._tracker.update(codes, frame.time_s, table)
         tracked = perf_counter()
         estimate, measured = self._estimate(frame, pose)

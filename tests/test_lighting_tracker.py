@@ -11,6 +11,7 @@ from arlight.color import encoded_from_linear
 from arlight.errors import CameraError, ProbeError, RenderingUnavailableError
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.layout import design_probe
+from arlight.radiometry import Radiometry
 from arlight.synthetic.settings import SynthesisSettings, default_camera
 from arlight.synthetic.sheet import SheetLayers
 from arlight.synthetic.synthesis import synthesize
@@ -94,6 +95,34 @@ def test_video_with_half_resolution_chroma_tells_the_same(film, bits):
     error = relative_error(estimate.lighting, synthetic.truth)
     assert error.max() < 0.05
     assert error[:, 1].max() < 0.035
+
+
+BLACK = 0.01
+
+
+@pytest.mark.parametrize("chroma", ["full", "half"])
+def test_a_camera_with_another_response_tells_the_same_once_it_is_measured(film, chroma):
+    response = tuple(np.linspace(0.0, 1.0, 129) ** 2.2)
+    measured = replace(CAMERA, radiometry=Radiometry(response, BLACK))
+    error, light = {}, {}
+    for name, camera in {"srgb": CAMERA, "measured": measured, "believed": CAMERA}.items():
+        tracker = LightingTracker(PROBE, camera)
+        for synthetic in film(environment="bridge"):
+            frame = synthetic.frame
+            if name != "srgb":
+                signal = BLACK + (1.0 - BLACK) * frame.linear_rgb()
+                encoded = np.rint(255.0 * signal ** (1 / 2.2)).astype(np.uint8)
+                frame = Frame.from_rgb(encoded, frame.index, frame.time_s)
+            if chroma == "half":
+                frame = frame.converted(encoded_format(frame))
+            estimate = tracker.update(frame)
+        assert pose_error_px(estimate, synthetic.truth) < 0.1
+        light[name] = estimate.lighting.coefficients / synthetic.truth.coefficients[0].real.max()
+        error[name] = np.sqrt(np.mean(relative_error(estimate.lighting, synthetic.truth) ** 2))
+    # both are rounded to eight bits, each in its own way
+    assert np.sqrt(np.mean(np.abs(light["measured"] - light["srgb"]) ** 2)) < 0.005
+    assert error["measured"] < error["srgb"] + 0.005
+    assert error["believed"] > error["measured"] + 0.005
 
 
 def test_colour_of_the_light_survives_half_resolution_chroma(film):

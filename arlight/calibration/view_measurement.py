@@ -47,7 +47,7 @@ def find_sheet(frames: Iterable[Frame], probe: Probe, camera: Camera, light: int
     tracker = PoseTracker(probe, camera)
     seen = []
     for frame in frames:
-        codes, table = luma_codes(frame)
+        codes, table = luma_codes(frame, camera.radiometry)
         pose = tracker.update(codes, frame.time_s, table)
         if pose.camera_from_probe is not None and pose.status == "tracked":
             seen.append(SeenSheet(frame, pose, light))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.color import Transfer, encoded_from_linear
+from arlight.tracking.decoding import Decoding
 
 Array = NDArray[np.float64]
 
@@ -38,11 +38,13 @@ class ChromaCorrection:
     """(blocks,) share of a colour swing that was seen, 0 to 1."""
 
 
-def color_line(dark: Array, bright: Array, transfer: Transfer, ycc_from_rgb: Array) -> tuple[Array, Array]:
+def color_line(dark: Array, bright: Array, curve: Decoding, ycc_from_rgb: Array) -> tuple[Array, Array]:
     """Nodes of the line between two colours, and on, in encoded values.
 
     Args:
         dark, bright: (3,) linear RGB.
+        curve: how the picture is encoded.
+        ycc_from_rgb: (3, 3) of the picture's format.
 
     Returns:
         luma (nodes,), increasing, and chroma (nodes, 2).
@@ -50,7 +52,7 @@ def color_line(dark: Array, bright: Array, transfer: Transfer, ycc_from_rgb: Arr
     t = 1.2 * np.linspace(0.0, 1.0, _LINE_NODES) ** 2
     slope = np.maximum(bright - dark, 1e-4)
     linear = dark + t[:, None] * slope / slope.max()
-    ycc = encoded_from_linear(linear, transfer).astype(float) @ ycc_from_rgb.T
+    ycc = curve.encoded(linear) @ ycc_from_rgb.T
     return np.maximum.accumulate(ycc[:, 0]), np.ascontiguousarray(ycc[:, 1:])
 
 

@@ -10,20 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
-from arlight.color import linear_from_encoded
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking import block_kernels as kernels
 from arlight.tracking.block_color import chroma_correction, color_line
 from arlight.tracking.block_layout import BlockLayout, BlockView, field_blocks
 from arlight.tracking.block_means import ROWS, BlockMeans
-from arlight.video.conversion import decoding_table, encoding_table
+from arlight.tracking.decoding import Decoding, decoding
 from arlight.video.frame import Frame
 
 Array = NDArray[np.float64]
 
-_CLIP = 0.94
-"""Linear value from which a pixel counts as clipped: codecs ring around true white."""
 _BRIGHTEST_STRIPE = 1.1
 """Radiance that no stripe reaches, relative to white: what is brighter is a lamp in the film."""
 _LAMP_OVER_AVERAGE = 1.5
@@ -81,14 +78,14 @@ class BlockMeter:
         view = self._layout.view(self._camera, pose, blur_px if np.isfinite(blur_px) else _UNRESOLVED_BLUR_PX)
         count = self._gather(view, pose)
         self._read(frame, count)
+        curve = decoding(frame.format.transfer, self._camera.radiometry)
         trust = np.ones(len(self._first) - 1)
         if max(frame.format.chroma_shift) > 0:
             seen = None if stripes is None else stripes * view.gain[:, None, None]
-            trust = self._infer_chroma(frame, view, count, seen)
-        table = decoding_table(frame.format.transfer)[:-1]
+            trust = self._infer_chroma(frame, curve, view, count, seen)
         matrix = frame.format.rgb_from_ycc().astype(float)
-        kernels.linearise(self._encoded, count, matrix, table, self._linear)
-        kernels.below(self._linear, self._first, self._ceiling(count), self._used)
+        kernels.linearise(self._encoded, count, matrix, curve.light, self._linear)
+        kernels.below(self._linear, self._first, self._ceiling(count, curve.clip), self._used)
         return self._fit(view, trust)
 
     def _gather(self, view: BlockView, pose: Pose) -> int:
@@ -121,20 +118,17 @@ class BlockMeter:
                     plane, shift_x, shift_y, width, self._pixels, count, neutral, 1.0 / swing, c, self._encoded
                 )
 
-    def _infer_chroma(self, frame: Frame, view: BlockView, count: int, stripes: Array | None) -> Array:
+    def _infer_chroma(self, frame: Frame, curve: Decoding, view: BlockView, count: int, stripes: Array | None) -> Array:
         """Bring chroma to full resolution along the blocks' stripes; returns how far it was seen."""
         self._chroma[:count, :2] = self._encoded[:count, 1:]
         expected = self._chroma[:count, 2:]
         matrix = frame.format.ycc_from_rgb().astype(float)
-        transfer = frame.format.transfer
         if stripes is None:
-            luma, chroma = color_line(*self._reference_colors(count, frame), transfer, matrix)
+            luma, chroma = color_line(*self._reference_colors(count, frame, curve), curve, matrix)
             for c in range(2):
                 expected[:, c] = np.interp(self._encoded[:count, 0], luma, chroma[:, c])
         else:
-            kernels.modelled_chroma(
-                self._encoded, self._first, self._phases, stripes, matrix, encoding_table(transfer)[:-1], expected
-            )
+            kernels.modelled_chroma(self._encoded, self._first, self._phases, stripes, matrix, curve.codes, expected)
         kernels.flatten_chroma(self._first, ~self._patterned, expected)
         self._used[:count] = True
         fitted = self._solve(self._chroma, np.minimum(view.harmonics, 1)).coefficients
@@ -147,27 +141,27 @@ class BlockMeter:
         kernels.correct_chroma(self._encoded, self._first, self._phases, expected, correction.shift, correction.swing)
         return correction.trust
 
-    def _ceiling(self, count: int) -> Array:
+    def _ceiling(self, count: int, clip: float) -> Array:
         """(blocks, 3) linear values that only a mirrored lamp exceeds."""
         average = np.empty((len(self._patterned), 3))
         kernels.block_average(self._linear[:count], self._first, average)
-        ceiling = np.full_like(average, _CLIP)
+        ceiling = np.full_like(average, clip)
         white = average[self._white & (np.diff(self._first) >= _MIN_SAMPLES)]
         if len(white):
             # a lower quartile: some of the white blocks may mirror a lamp themselves
             level = _BRIGHTEST_STRIPE * np.quantile(white, 0.25, axis=0)
             # an evenly bright mirror image, the sky's at grazing view, lifts its block's stripes and hides none
             lifted = np.maximum(level, _LAMP_OVER_AVERAGE * average[~self._white])
-            ceiling[~self._white] = np.minimum(lifted, _CLIP)
+            ceiling[~self._white] = np.minimum(lifted, clip)
         return ceiling
 
-    def _reference_colors(self, count: int, frame: Frame) -> tuple[Array, Array]:
+    def _reference_colors(self, count: int, frame: Frame, curve: Decoding) -> tuple[Array, Array]:
         """Linear RGB of a black and of a white region, medians over the sheet."""
         average = np.empty((len(self._patterned), 3))
         kernels.block_average(self._encoded[:count], self._first, average)
-        linear = linear_from_encoded(average @ frame.format.rgb_from_ycc().T, frame.format.transfer).astype(float)
+        linear = curve.linear(average @ frame.format.rgb_from_ycc().T)
         seen = np.diff(self._first) >= _MIN_SAMPLES
-        black, white = linear[self._black & seen], linear[self._white & seen & (linear.max(axis=1) < _CLIP)]
+        black, white = linear[self._black & seen], linear[self._white & seen & (linear.max(axis=1) < curve.clip)]
         dark = np.median(black, axis=0) if len(black) else np.zeros(3)
         return dark, np.median(white, axis=0) if len(white) else linear[seen].max(axis=0, initial=1e-3)
 

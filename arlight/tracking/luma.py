@@ -1,28 +1,32 @@
 """The luma plane as trackers want it: codes as they stand in the stream, and what light each code means."""
 
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.color import linear_from_encoded
+from arlight.radiometry import Radiometry
+from arlight.tracking.decoding import decoding
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import PixelFormat
 
 
-def luma_codes(frame: Frame) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+def luma_codes(frame: Frame, radiometry: Radiometry | None = None) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Luma codes (h, w), uint8, and the linear light (256,) of each code.
 
     An 8-bit luma plane is handed on as it is; other formats are brought to full-range 8 bits first.
+
+    Args:
+        frame: the picture.
+        radiometry: the camera's own curve; None to believe the footage's.
     """
     format_ = frame.format
     if format_.matrix != "rgb" and format_.bit_depth == 8:
-        return np.asarray(frame.planes[0], np.uint8), _table(format_)
-    return frame.luma(), _table(PixelFormat("gray", True, 8, transfer=format_.transfer))
+        return np.asarray(frame.planes[0], np.uint8), _table(format_, radiometry)
+    return frame.luma(), _table(PixelFormat("gray", True, 8, transfer=format_.transfer), radiometry)
 
 
-@cache
-def _table(format_: PixelFormat) -> NDArray[np.float32]:
+@lru_cache(maxsize=16)
+def _table(format_: PixelFormat, radiometry: Radiometry | None) -> NDArray[np.float32]:
     black, white = format_.luma_code_range
-    table: NDArray[np.float32] = linear_from_encoded((np.arange(256) - black) / white, format_.transfer)
-    return table
+    return decoding(format_.transfer, radiometry).linear((np.arange(256) - black) / white).astype(np.float32)

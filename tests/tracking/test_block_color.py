@@ -5,6 +5,7 @@ import pytest
 
 from arlight.color import encoded_from_linear
 from arlight.tracking.block_color import chroma_correction, color_line
+from arlight.tracking.decoding import decoding
 from arlight.video.pixel_format import PixelFormat
 
 BT709 = PixelFormat("bt709", False, 8)
@@ -22,7 +23,7 @@ TRANSFERS = ["srgb", "bt709", "gamma22", "hlg", "linear"]
 @pytest.mark.parametrize("name", LINES)
 def test_chroma_of_pixels_between_black_and_white_is_known_from_their_luma(transfer, name):
     dark, bright = (np.array(color) for color in LINES[name])
-    luma, chroma = color_line(dark, bright, transfer, YCC_FROM_RGB)
+    luma, chroma = color_line(dark, bright, decoding(transfer), YCC_FROM_RGB)
     assert np.all(np.diff(luma) >= 0.0)
     # to white and somewhat beyond, but not to where the brightest channel clips
     reach = min(1.2, 0.9 * (1.0 - dark.max()) / (bright - dark).max())
@@ -35,15 +36,15 @@ def test_chroma_of_pixels_between_black_and_white_is_known_from_their_luma(trans
 
 def test_a_colour_line_has_a_direction_and_no_length():
     dark, bright = (np.array(color) for color in LINES["amber"])
-    one = color_line(dark, bright, "srgb", YCC_FROM_RGB)
-    other = color_line(dark, dark + 0.2 * (bright - dark), "srgb", YCC_FROM_RGB)
+    one = color_line(dark, bright, decoding("srgb"), YCC_FROM_RGB)
+    other = color_line(dark, dark + 0.2 * (bright - dark), decoding("srgb"), YCC_FROM_RGB)
     for first, second in zip(one, other, strict=True):
         np.testing.assert_allclose(first, second, atol=1e-6)
 
 
 def test_black_that_is_as_bright_as_white_still_gives_a_line():
     same = np.full(3, 0.2)
-    luma, chroma = color_line(same, same, "srgb", YCC_FROM_RGB)
+    luma, chroma = color_line(same, same, decoding("srgb"), YCC_FROM_RGB)
     assert np.all(np.isfinite(luma))
     np.testing.assert_allclose(chroma, 0.0, atol=1e-6)
 

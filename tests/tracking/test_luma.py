@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from arlight.radiometry import Radiometry
 from arlight.tracking.luma import luma_codes
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import PixelFormat, chroma_offset_px
@@ -58,3 +59,16 @@ def test_codes_beyond_black_and_white_are_clamped():
     assert np.all(table[:17] == 0.0)
     np.testing.assert_allclose(table[235:], 1.0, atol=1e-6)
     assert np.all(np.diff(table[16:236]) > 0.0)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_the_camera_s_own_curve_goes_before_the_footage_s(name):
+    frame = frame_in(formats()[name])
+    radiometry = Radiometry(tuple(np.linspace(0.0, 1.0, 33) ** 1.7), black=0.02)
+    codes, table = luma_codes(frame, radiometry)
+    black, white = frame.format.luma_code_range
+    encoded = (frame.planes[0] - black) / white
+    # half a code of eight bits where there are more, times the steepest slope
+    tolerance = 1e-5 if frame.format.bit_depth == 8 else 0.5 / 255 * 1.8
+    np.testing.assert_allclose(table[codes], radiometry.linear(encoded), atol=tolerance)
+    assert table.min() < -0.015
