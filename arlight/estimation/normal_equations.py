@@ -4,10 +4,24 @@ Row r of block i reads  d_r0 L_0 + d_r1 Re L_n(i) + d_r2 Im L_n(i) + ... + mirro
 (L_0, Re L_1, ..., w) it touches three or five coefficients and the field, so nothing of full width is ever multiplied.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Normal equations of m further unknowns once the system's own have been solved for."""
+
+    information: Array
+    """(m, m) information about them, the system's unknowns being free."""
+    right: Array
+    """(m,) right-hand side."""
+    carried: Array
+    """(c + s, m) how much the system's solution moves against each of them."""
 
 
 class BlockSystem:
@@ -52,6 +66,31 @@ class BlockSystem:
         normal[np.diag_indices_from(normal)] += self._prior
         right += self._prior * self._expected
         return np.asarray(np.linalg.solve(normal, right), float), normal
+
+    def beside(
+        self, normal: Array, design: Array, mirror: Array, precision: Array, slopes: Array, missed: Array
+    ) -> Beside:
+        """Equations of unknowns that change the rows by slopes (blocks, rows, m); missed: (blocks, rows) residuals."""
+        weighted = precision @ slopes
+        cross = np.zeros((len(normal), slopes.shape[2]))
+        np.add.at(cross, self._places, np.swapaxes(design, 1, 2) @ weighted)
+        cross[self._coefficients :] = self._basis.T @ np.einsum("br,brm->bm", mirror, weighted)
+        carried = np.asarray(np.linalg.solve(normal, cross), float)
+        information = np.einsum("brk,brm->km", slopes, weighted) - cross.T @ carried
+        return Beside(information, np.einsum("brk,br->k", weighted, missed), carried)
+
+    def explained(self, covariance: Array, design: Array, mirror: Array, precision: Array) -> Array:
+        """(blocks, rows, rows) part of each block's precision that the fit uses up: P A C A' P.
+
+        Args:
+            covariance: (c + s, c + s) of the unknown; the rest as in `solve`.
+        """
+        field = self._coefficients + np.arange(self.field_size)
+        unknown = np.concatenate([self._places, np.broadcast_to(field, (len(self._places), len(field)))], axis=1)
+        wide = np.concatenate([design, mirror[:, :, None] * self._basis[:, None, :]], axis=2)
+        weighted = precision @ wide
+        own = covariance[unknown[:, :, None], unknown[:, None, :]]
+        return np.asarray(weighted @ own @ np.swapaxes(weighted, 1, 2), float)
 
     def field(self, solution: Array) -> Array:
         """Reflection field (blocks,) of a solution."""
