@@ -1,11 +1,14 @@
 """The paper's irradiance under many environments at once: paths made by Mitsuba, put on every point of the sheet."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from arlight.environment import Environment
 from arlight.validation.assembled_layers import AssembledLayers
@@ -17,7 +20,7 @@ STEP = 4
 """Fine samples between neighbouring samples of the paper's light."""
 _BORDER_MM = 14.0
 # what of the products stays in a core's cache
-_CHUNK = 512
+_CHUNK = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,17 +65,13 @@ def gather_irradiance(
         for k in range(settings.sets)
     ]
     out = np.zeros((rows, 3 * len(environments), columns), np.float32)
-    product = np.empty((_CHUNK, columns), np.float32)
-    for row in range(rows):
-        paths = sets[row % len(sets)]
-        for start in range(0, len(paths.film_count), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            view = product[: len(paths.film_count[part])]
-            _film_and_paper(
-                planes[0].values, planes[1].values, row + planes[0].border, planes[0].border,
-                paths.film[part], paths.film_count[part], paths.paper[part], paths.paper_count[part], view,
-            )  # fmt: skip
-            out[row] += paths.light[:, part] @ view
+
+    def gather(row: int) -> None:
+        _gather_row(planes[0], planes[1], sets[row % len(sets)], row, out[row])
+
+    # a row a thread: nobody waits for the others
+    with threadpool_limits(1), ThreadPoolExecutor(os.cpu_count()) as threads:
+        list(threads.map(gather, range(rows)))
     return np.ascontiguousarray(out.transpose(1, 0, 2)).reshape(len(environments), 3, rows, columns)
 
 
@@ -85,6 +84,19 @@ def radiosity(layers: AssembledLayers, irradiance: Image) -> Image:
     """
     paper = layers.paper[::2, ::2]
     return np.stack([_doubled(plane) * paper for plane in irradiance], axis=-1)
+
+
+def _gather_row(film: "_Planes", paper: "_Planes", paths: "_PlacedPaths", row: int, out: Image) -> None:
+    """Add up the light (channels, columns) of one row."""
+    product = np.empty((_CHUNK, out.shape[1]), np.float32)
+    for start in range(0, len(paths.film_count), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        view = product[: len(paths.film_count[part])]
+        _film_and_paper(
+            film.values, paper.values, row + film.border, film.border,
+            paths.film[part], paths.film_count[part], paths.paper[part], paths.paper_count[part], view,
+        )  # fmt: skip
+        out += paths.light[:, part] @ view
 
 
 def _doubled(plane: Image) -> Image:
@@ -145,12 +157,12 @@ def _fine_steps(places_mm: NDArray[np.float64], per_mm: float) -> NDArray[np.int
     return np.rint(places_mm[..., ::-1] * [-per_mm, per_mm]).astype(np.int64)
 
 
-@njit(parallel=True, cache=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True)
 def _film_and_paper(film, paper, row, column, film_at, film_count, paper_at, paper_count, out):  # type: ignore[no-untyped-def]
     """out[path, c] = product of film and paper where the path meets them, for the paper points of one row."""
     count, columns = out.shape
     step = film.shape[0]
-    for path in prange(count):
+    for path in range(count):
         target = out[path]
         for k in range(film_count[path]):
             dy, dx = film_at[path, k]
