@@ -51,7 +51,7 @@ class ProofStage:
         return self._film(folder, path, poses, TEST_LIGHTS, PATH_SEEDS[path])
 
     def film_known(self, folder: Path) -> list[str]:
-        """Film three views under each of the known lights, 15 to 55 degrees off the normal: known-LIGHT.mp4."""
+        """Film three views under each of the known lights, 15 to 50 degrees off the normal: known-LIGHT.mp4."""
         names = []
         for index, name in enumerate(KNOWN_LIGHTS):
             poses = [self._pose(_known_stand(_KNOWN_VIEWS * index + view)) for view in range(_KNOWN_VIEWS)]
@@ -149,7 +149,7 @@ def trace_proof(folder: Path, captured: Path, report: Report) -> None:
 
 
 def _known_stand(index: int) -> Stand:
-    """Views that fill 15 to 55 degrees and the half circle before the sheet evenly, however many there are."""
+    """Views spread over 15 to 50 degrees off the normal and a hundred degrees of azimuth before the sheet."""
     first, second = (0.5 + index * 0.7548776662466927) % 1.0, (0.5 + index * 0.5698402909980532) % 1.0
     return Stand(15.0 + 40.0 * first, -140.0 + 100.0 * second, roll_deg=6.0 * (first + second - 1.0))
 
