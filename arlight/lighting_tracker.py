@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,6 +15,7 @@ from arlight.estimation.lighting import Lighting
 from arlight.fourier import orders_up_to
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
+from arlight.tracking.block_means import BlockMeans
 from arlight.tracking.blocks import BlockMeter
 from arlight.tracking.luma import luma_codes
 from arlight.tracking.pose import ProbePose
@@ -61,6 +63,13 @@ class FrameEstimate:
     stripes are resolved."""
 
 
+class BlockEstimator(Protocol):
+    """What makes lighting of a frame's blocks, such as `LightingEstimator`."""
+
+    def estimate(self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None) -> Estimate:
+        """Lighting of one frame from its blocks and the last frame's nuisance."""
+
+
 class LightingTracker:
     """Follows the sheet and the light that falls on it.
 
@@ -69,6 +78,7 @@ class LightingTracker:
         camera: intrinsics of the camera that filmed it.
         settings: choices that trade speed for accuracy.
         assembly: what calibration found the printed sheet to be; exactly as designed by default.
+        estimator: what makes lighting of the blocks; the model of the assembled sheet by default.
 
     Raises:
         ProbeError: the sheet's fiducials are unknown to ArUco, or it does not measure the order that is asked for.
@@ -80,6 +90,7 @@ class LightingTracker:
         camera: Camera,
         settings: TrackerSettings | None = None,
         assembly: Assembly | None = None,
+        estimator: BlockEstimator | None = None,
     ) -> None:
         self._settings = settings or TrackerSettings()
         if self._settings.order is not None:
@@ -87,7 +98,7 @@ class LightingTracker:
         self._radiometry = camera.radiometry
         self._tracker = PoseTracker(probe, camera)
         self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
-        self._estimator = LightingEstimator(probe, assembly, bounces=self._settings.bounces)
+        self._estimator = estimator or LightingEstimator(probe, assembly, bounces=self._settings.bounces)
         self._filter = LightingFilter()
         self.reset()
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
-from arlight.lighting_tracker import FrameEstimate, LightingTracker, TrackerSettings
+from arlight.lighting_tracker import BlockEstimator, FrameEstimate, LightingTracker, TrackerSettings
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.pose import ProbePose
@@ -52,6 +52,7 @@ class Pipeline:
         relighter: FrameRelighter | None = None,
         settings: TrackerSettings | None = None,
         assembly: Assembly | None = None,
+        estimator: BlockEstimator | None = None,
     ) -> None:
         """Prepare the loop.
 
@@ -61,11 +62,12 @@ class Pipeline:
             relighter: draws the object; None leaves the frames as they are (lighting only).
             settings: choices of the estimation.
             assembly: what calibration found the printed sheet to be.
+            estimator: what makes lighting of the blocks; the model of the assembled sheet by default.
 
         Raises:
             ProbeError: the sheet cannot be tracked.
         """
-        self._tracker = LightingTracker(probe, camera, settings, assembly)
+        self._tracker = LightingTracker(probe, camera, settings, assembly, estimator)
         self._relighter = relighter
 
     def process(self, frame: Frame) -> FrameResult:

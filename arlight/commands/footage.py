@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from arlight.calibration.focal_length import estimate_camera
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
-from arlight.commands.self_calibration import self_calibrate_clip
+from arlight.commands.sheet_calibration import CalibrationOptions, calibration_of
 from arlight.errors import ArlightError, CalibrationError, CameraError, ProbeError, VideoError
+from arlight.estimation.fixed_estimator import FixedEstimator
 from arlight.probe.assembly import Assembly
-from arlight.probe.assembly_storage import load_assembly, load_vignetting
 from arlight.probe.design import Probe
 from arlight.probe.storage import load_probe
 from arlight.results.statistics import RunStatistics
-from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.recognition import ids_text, markers_of, recognise_markers, same_family
 from arlight.video.reader import VideoReader
 from arlight.video.sidecars import find_sidecar
@@ -40,13 +39,8 @@ class SheetAndCamera:
 
 
 @dataclass(frozen=True)
-class FootageOptions(SheetAndCamera):
+class FootageOptions(CalibrationOptions, SheetAndCamera):
     """What was filmed, with what, and how the sheet turned out; found beside the clip where it is not given."""
-
-    calibration: OptionalFile = None
-    """NAME.calibration.json of the sheet as it was printed and put together, from `arlight calibrate`."""
-    self_calibrate: bool = False
-    """Calibrate the sheet on the first seconds of the clip itself; the camera must move over it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +57,12 @@ class Footage:
     """Where the probe was read from."""
     camera_path: Path | None
     """Where the camera was read from; None when it was estimated from the clip."""
+    calibration_path: Path | None = None
+    """Where the sheet's calibration was read from; None without one, or where it was made from the clip."""
     assembly: Assembly | None = None
     """The sheet as it was printed and put together; None for exactly as designed."""
+    fixed: FixedEstimator | None = None
+    """The paper's L = MV, where it was asked for."""
     notes: tuple[str, ...] = ()
     """What the user should know of how probe, camera and calibration were come by."""
 
@@ -86,14 +84,16 @@ def open_footage(clip: Path, options: FootageOptions) -> Footage:
     """
     reader = VideoReader(clip)
     try:
-        probe_path = _probe_path(clip, options)
-        probe, camera, notes = sheet_and_camera(clip, options)
-        assembly, vignetting, calibrated = _calibration(clip, options, probe, camera)
-        if any(vignetting):
-            own = np.array(camera.vignetting or (0.0, 0.0, 0.0)) + vignetting
-            camera = replace(camera, vignetting=(float(own[0]), float(own[1]), float(own[2])))
-        camera_path = options.camera or find_sidecar(clip, "camera")
-        return Footage(reader, probe, camera, probe_path, camera_path, assembly, (*notes, *calibrated))
+        probe_path, camera_path = _paths(clip, options)
+        probe = load_probe(probe_path)
+        camera, notes = _camera(reader, camera_path, probe)
+        calibration = calibration_of(clip, options, probe, camera)
+        if calibration.note is not None:
+            notes = (*notes, calibration.note)
+        return Footage(
+            reader, probe, _with_vignetting(camera, calibration.vignetting), probe_path, camera_path, calibration.path,
+            calibration.assembly, calibration.fixed, notes,
+        )  # fmt: skip
     except BaseException:
         reader.close()
         raise
@@ -101,44 +101,42 @@ def open_footage(clip: Path, options: FootageOptions) -> Footage:
 
 def sheet_and_camera(clip: Path, options: SheetAndCamera) -> tuple[Probe, Camera, tuple[str, ...]]:
     """The sheet and the camera of a clip, and what to tell the user about them; raises as `open_footage`."""
-    probe = load_probe(_probe_path(clip, options))
-    camera_path = options.camera or find_sidecar(clip, "camera")
+    probe_path, camera_path = _paths(clip, options)
+    probe = load_probe(probe_path)
     with VideoReader(clip) as reader:
-        if camera_path is None:
-            estimate = estimate_camera(reader, probe)
-            return probe, estimate.camera, (f"{clip}: {estimate.summary}",)
-        camera = Camera.load(camera_path)
-        if camera.image_size != reader.size:
-            raise CameraError(
-                f"{camera_path}: is for pictures of {_size(camera.image_size)}, {clip} has {_size(reader.size)}; give "
-                "the camera.json of this footage (--camera FILE)"
-            )
-    return probe, camera, ()
+        return probe, *_camera(reader, camera_path, probe)
 
 
-def _probe_path(clip: Path, options: SheetAndCamera) -> Path:
-    path = options.probe or find_sidecar(clip, "probe")
-    if path is None:
+def _paths(clip: Path, options: SheetAndCamera) -> tuple[Path, Path | None]:
+    """Where the probe is, and the camera if there is one."""
+    probe = options.probe or find_sidecar(clip, "probe")
+    if probe is None:
         raise ProbeError(f"{clip}: no probe.json beside it; give the one that `arlight probe` wrote: --probe FILE")
-    return path
+    return probe, options.camera or find_sidecar(clip, "camera")
 
 
-def _calibration(
-    clip: Path, options: FootageOptions, probe: Probe, camera: Camera
-) -> tuple[Assembly | None, tuple[float, float, float], tuple[str, ...]]:
-    """The assembled sheet, the vignetting found with it, and what to tell the user."""
-    if options.self_calibrate:
-        if options.calibration is not None:
-            raise CalibrationError(
-                f"{options.calibration}: --self-calibrate makes a calibration of its own; leave one of them out"
-            )
-        found = self_calibrate_clip(clip, probe, camera)
-        note = f"{clip}: sheet calibrated on {found.views} views (residual chi-square {found.chi2:.2f})"
-        return found.assembly, found.vignetting, (note,)
-    path = options.calibration or find_sidecar(clip, "calibration")
+def _camera(reader: VideoReader, path: Path | None, probe: Probe) -> tuple[Camera, tuple[str, ...]]:
+    """The camera that filmed a clip, estimated where there is no file of it, and what to tell about it."""
     if path is None:
-        return None, (0.0, 0.0, 0.0), ()
-    return load_assembly(path, len(field_blocks(probe))), load_vignetting(path), (f"sheet as in {path}",)
+        try:
+            estimate = estimate_camera(reader, probe)
+        except CalibrationError as error:
+            raise CalibrationError(f"{reader.path}: {error}") from error
+        return estimate.camera, (f"{reader.path}: {estimate.summary}",)
+    camera = Camera.load(path)
+    if camera.image_size != reader.size:
+        raise CameraError(
+            f"{path}: is for pictures of {_size(camera.image_size)}, {reader.path} has {_size(reader.size)}; give "
+            "the camera.json of this footage (--camera FILE)"
+        )
+    return camera, ()
+
+
+def _with_vignetting(camera: Camera, more: tuple[float, float, float]) -> Camera:
+    if not any(more):
+        return camera
+    own = camera.vignetting or (0.0, 0.0, 0.0)
+    return replace(camera, vignetting=(own[0] + more[0], own[1] + more[1], own[2] + more[2]))
 
 
 def check_result(footage: Footage, statistics: RunStatistics) -> None:

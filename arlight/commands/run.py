@@ -94,7 +94,7 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
         lighting = Path(f"{options.clip.stem}.jsonl")
     if output is not None:
         check_output(output, [])
-    inputs = [options.clip, footage.probe_path, footage.camera_path, options.footage.calibration]
+    inputs = [options.clip, footage.probe_path, footage.camera_path, footage.calibration_path]
     inputs.append(options.relighting.object)
     return prepare_outputs({"--output": output, "--lighting": lighting, "--report": options.report}, inputs)
 
@@ -102,7 +102,7 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
 def _pipeline(options: RunOptions, footage: Footage) -> Pipeline:
     probe, camera, order = footage.probe, footage.camera, options.order
     relighter = make_relighter(options.relighting, probe, camera, order) if options.render else None
-    return Pipeline(probe, camera, relighter, TrackerSettings(order=order), footage.assembly)
+    return Pipeline(probe, camera, relighter, TrackerSettings(order=order), footage.assembly, footage.fixed)
 
 
 def _process(

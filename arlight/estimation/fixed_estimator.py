@@ -7,6 +7,7 @@ With fewer lightings than coefficients M needs a ridge; leaving lightings out ch
 
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class FixedCalibration:
             raise CalibrationError(
                 f"{path}: cannot be read; expected what `arlight calibrate known --estimator fixed` wrote"
             ) from error
-        except (KeyError, ValueError, EOFError) as error:
+        except (KeyError, ValueError, EOFError, BadZipFile) as error:
             raise CalibrationError(
                 f"{path}: not a fixed calibration ({error}); expected what `arlight calibrate known --estimator fixed` "
                 "wrote"

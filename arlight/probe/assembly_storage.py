@@ -13,6 +13,7 @@ from arlight.probe.fields import Field
 
 FORMAT = "arlight-calibration"
 VERSION = 1
+_KIND = "NAME.calibration.json"
 
 _LARGEST_SHIFT_MM = 50.0
 
@@ -54,7 +55,7 @@ def load_assembly(path: Path | str, block_count: int) -> Assembly:
     Raises:
         ProbeError: the file is missing, is not such JSON, holds impossible values, or is for another sheet.
     """
-    content = Field.read(Path(path))
+    content = Field.read(Path(path), _KIND)
     content.at("format").text([FORMAT])
     content.at("version").integer(VERSION, VERSION)
     try:
@@ -76,7 +77,7 @@ def load_vignetting(path: Path | str) -> tuple[float, float, float]:
     Raises:
         ProbeError: as for `load_assembly`.
     """
-    content = Field.read(Path(path))
+    content = Field.read(Path(path), _KIND)
     if not content.has("vignetting"):
         return 0.0, 0.0, 0.0
     k1, k2, k3 = (item.number(-2.0, 2.0) for item in content.at("vignetting").items(3))

@@ -21,8 +21,12 @@ class Field:
     """Path inside the file, such as `blocks[3].frequency`; empty for the whole."""
 
     @classmethod
-    def read(cls, path: Path) -> "Field":
+    def read(cls, path: Path, kind: str = "probe.json") -> "Field":
         """The whole content of a JSON file.
+
+        Args:
+            path: where it is.
+            kind: what kind of file it is to be.
 
         Raises:
             ProbeError: the file is missing, unreadable or not JSON.
@@ -30,10 +34,10 @@ class Field:
         try:
             return cls(json.loads(path.read_text(encoding="utf-8")), path)
         except OSError as error:
-            raise ProbeError(f"{path}: cannot be read ({error.strerror}); a probe.json is expected there") from error
+            raise ProbeError(f"{path}: cannot be read ({error.strerror}); a {kind} is expected there") from error
         # ValueError covers bad JSON and bad UTF-8; absurdly deep nesting ends in RecursionError
         except (ValueError, RecursionError) as error:
-            raise ProbeError(f"{path}: expected JSON, found something else ({error})") from error
+            raise ProbeError(f"{path}: expected JSON ({kind}), found something else ({error})") from error
 
     def refuse(self, expected: str, found: str | None = None) -> ProbeError:
         """The error to raise when this field is not what it must be."""

@@ -197,11 +197,11 @@ def test_bad_input_is_refused_and_nothing_is_touched(arlight, footage, tmp_path,
     assert re.search(message, done.errors), done.errors
 
 
-def test_a_clip_without_sidecars_asks_for_them(arlight, footage, tmp_path):
+def test_a_clip_without_a_probe_asks_for_it(arlight, footage, tmp_path):
     shutil.copy(footage / "orbit.mp4", tmp_path / "clip.mp4")
-    assert "--probe FILE" in arlight("run", "clip.mp4").errors
-    shutil.copy(footage / "probe.json", tmp_path / "probe.json")
-    assert "--camera FILE" in arlight("run", "clip.mp4").errors
+    done = arlight("run", "clip.mp4")
+    assert done.status == 1
+    assert "--probe FILE" in done.errors
 
 
 def test_a_clip_with_no_sheet_in_it_leaves_everything_as_it_was(arlight, empty_table, tmp_path):
