@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.benchmark.consistency import logged_consistency
 from arlight.benchmark.following import Step, direction_lag, find_step
 from arlight.fourier import frequency_order
 from arlight.results.log import LightingLog, LogError
@@ -72,6 +73,9 @@ class Evaluation:
     """None where no frame was tracked."""
     chi2: float
     """Median residual chi-square per degree of freedom."""
+    normalised_error: float
+    """Mean squared error over the variance that was reported with it, a degree of freedom: 1 where error bars are
+    honest; nan where none were logged."""
     timings_ms: dict[str, float]
     """Median milliseconds per stage."""
     step: Step | None
@@ -96,6 +100,7 @@ def evaluate(log: LightingLog, truth: ClipTruth) -> Evaluation:
     times = np.array([record.time_s for record in records])
     true = np.stack([truth.frames[record.frame].coefficients[in_truth] for record in records])
     estimated = np.stack([_coefficients(record, in_log) for record in records])
+    stddev = np.stack([_stddev(record, in_log) for record in records])
     settled = [position for position, record in enumerate(records) if record.frame >= SETTLING_FRAMES]
     rows = settled or list(range(len(records)))
     orders = frequency_order(frequencies)
@@ -109,6 +114,7 @@ def evaluate(log: LightingLog, truth: ClipTruth) -> Evaluation:
         all_orders=order_error(estimated[rows], true[rows], orders > 0, int(orders.max())) if orders.max() else None,
         pose=_pose_error(log.header, records, truth),
         chi2=_median([record.chi2 for record in records]),
+        normalised_error=logged_consistency(estimated[rows], stddev[rows], true[rows]),
         timings_ms=_median_timings(records),
         step=find_step(estimated, true),
         lag=_lag(estimated, true, frequencies, log.header, times, rows),
@@ -149,6 +155,15 @@ def _coefficients(record: LogRecord, rows: list[int]) -> Complex:
     padded = np.zeros((max(rows) + 1, 3), complex)
     count = min(len(padded), len(record.coefficients))
     padded[:count] = record.coefficients[:count]
+    return padded[rows]
+
+
+def _stddev(record: LogRecord, rows: list[int]) -> Array:
+    """(k, 3) standard deviations of the chosen rows; nan where none is reported."""
+    padded = np.full((max(rows) + 1, 3), np.nan)
+    if record.stddev is not None:
+        count = min(len(padded), len(record.stddev))
+        padded[:count] = record.stddev[:count]
     return padded[rows]
 
 

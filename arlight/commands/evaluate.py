@@ -78,6 +78,13 @@ def _facts(evaluation: Evaluation) -> list[tuple[str, str]]:
             )
         )
     facts.append(("residual chi-square", f"{evaluation.chi2:.2f} per degree of freedom (median)"))
+    if math.isfinite(evaluation.normalised_error):
+        facts.append(
+            (
+                "error over error bar",
+                f"{evaluation.normalised_error:.2f} per degree of freedom, squared (mean; honest: 1)",
+            )
+        )
     if evaluation.step is not None:
         followed = evaluation.step.frames_to_follow
         facts.append(("90 % of the step", "not reached" if followed is None else f"followed within {followed} frames"))

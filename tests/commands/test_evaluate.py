@@ -1,6 +1,7 @@
 """`arlight evaluate`: the figures as a table and as JSON."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -44,6 +45,13 @@ def test_json_holds_the_same_figures(arlight, footage, perfect_log):
     assert figures["orders"][0]["relative_to_l0"] == pytest.approx(0.03, rel=1e-6)
     assert figures["step"] is None
     assert figures["chi2"] == pytest.approx(1.2)
+    # one real number of the sheet's five is 3 / 103 of its error bar off
+    assert figures["normalised_error"] == pytest.approx((0.03 / 1.03) ** 2 / 5, rel=1e-5)
+
+
+def test_error_bars_are_judged(arlight, footage, perfect_log):
+    done = arlight("evaluate", perfect_log, "--truth", footage / "orbit.truth.json")
+    assert re.search(r"error over error bar +0\.00 per degree of freedom", done.output)
 
 
 def test_a_cut_log_is_evaluated_and_the_cut_is_named(arlight, footage, perfect_log):
