@@ -70,6 +70,10 @@ class SynthesizeOptions:
     """Order of the sheet that is designed, 1 to 8."""
     white: float = 0.6
     """Linear value of white paper under the brightest light: the exposure."""
+    exposure_swing: float = 0.0
+    """Automatic exposure: share by which the gain swings up and down, once over the clip."""
+    white_balance_drift: float = 0.0
+    """Automatic white balance: share by which red gains and blue loses until the end."""
     sensor: Sensor = field(default_factory=Sensor)
     seed: int = 0
     """Chooses noise and shake."""
@@ -118,6 +122,8 @@ def _settings(options: SynthesizeOptions) -> SynthesisSettings:
         frame_rate=_rate(options.frame_rate),
         camera=default_camera(options.size) if options.camera is None else Camera.load(options.camera),
         white=options.white,
+        exposure_swing=options.exposure_swing,
+        white_balance_drift=options.white_balance_drift,
         sensor=options.sensor,
         seed=options.seed,
     )

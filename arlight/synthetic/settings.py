@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from arlight.camera import Camera
 from arlight.errors import ArlightError
@@ -50,6 +51,10 @@ class SynthesisSettings:
     """Camera that films; 1280x720 with a slight lens distortion by default."""
     white: float = 0.6
     """Linear value of white paper in its brightest channel under the brightest light; sets the exposure."""
+    exposure_swing: float = 0.0
+    """Automatic exposure: by which share the gain swings up and down, once over the clip; 0 for a locked exposure."""
+    white_balance_drift: float = 0.0
+    """Automatic white balance: by which share red gains and blue loses until the clip's end; 0 for a locked one."""
     bounces: int = 3
     """How often light between paper and glass is followed; 0 for single scattering."""
     sample_mm: float = 0.13
@@ -72,6 +77,9 @@ class SynthesisSettings:
             )
         if not self.white > 0.0:
             raise ArlightError(f"white must be above 0, found {self.white}")
+        for name in ("exposure_swing", "white_balance_drift"):
+            if not -1.0 < getattr(self, name) < 1.0:
+                raise ArlightError(f"{name} must lie between -1 and 1, found {getattr(self, name)}")
         if not 0 <= self.bounces <= 20:
             raise ArlightError(f"bounces must lie between 0 and 20, found {self.bounces}")
         if not 1 <= self.samples_per_side <= 16:
@@ -83,6 +91,12 @@ class SynthesisSettings:
     def frame_count(self) -> int:
         """Frames of the clip, at least one."""
         return max(1, round(self.duration_s * self.frame_rate))
+
+    def gain(self, time_s: float) -> NDArray[np.float64]:
+        """(3,) factor on what the camera records at a time [s], from automatic exposure and white balance."""
+        share = time_s / self.duration_s
+        balance = 1.0 + self.white_balance_drift * share * np.array([1.0, 0.0, -1.0])
+        return np.asarray((1.0 + self.exposure_swing * np.sin(2.0 * np.pi * share)) * balance, float)
 
     @property
     def filming_camera(self) -> Camera:

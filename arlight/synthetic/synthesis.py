@@ -36,7 +36,7 @@ def synthesize(
 
     1. The light's keys become irradiance of the paper, by FFT, when they are first needed.
     2. A shader draws what the camera sees, cross-fading two keys.
-    3. The sensor blurs it, adds noise and encodes it.
+    3. The sensor, under the exposure of the moment, blurs it, adds noise and encodes it.
 
     Args:
         settings: light, path, camera, sensor.
@@ -66,8 +66,10 @@ def synthesize(
         for index in range(settings.frame_count):
             time_s = float(index / settings.frame_rate)
             pose = motion.pose(time_s, camera, probe.sheet_mm)
-            image = settings.sensor.expose(stage.picture(time_s, pose), camera, noise)
-            truth = FrameTruth(pose, light.coefficients(time_s), exposure, time_s)
+            gain = settings.gain(time_s)
+            radiance = stage.picture(time_s, pose) * gain.astype(np.float32)
+            image = settings.sensor.expose(radiance, camera, noise)
+            truth = FrameTruth(pose, light.coefficients(time_s) * gain, exposure * float(gain[1]), time_s)
             yield SyntheticFrame(Frame.from_rgb(image, index, time_s), truth)
     finally:
         stage.close()

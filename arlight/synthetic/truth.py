@@ -28,7 +28,7 @@ class FrameTruth:
     coefficients: NDArray[np.complex128]
     """(k, 3) coefficients L~_n of the received lighting, 1 is the camera's full scale [radiance * sr]."""
     exposure: float
-    """Factor from the captured environment's radiance to the camera's."""
+    """Factor from the captured environment's radiance to the camera's, in green where white balance drifts."""
     time_s: float
     """Time of the frame [s]."""
 

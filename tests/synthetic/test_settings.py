@@ -33,6 +33,8 @@ def test_default_camera_sees_about_sixty_degrees():
         ({"duration_s": -1.0}, "positive"),
         ({"frame_rate": Fraction(0)}, "positive"),
         ({"white": 0.0}, "white"),
+        ({"exposure_swing": 1.0}, "exposure_swing"),
+        ({"white_balance_drift": float("nan")}, "white_balance_drift"),
         ({"bounces": -1}, "bounces"),
         ({"samples_per_side": 0}, "samples_per_side"),
         ({"sample_mm": 0.0}, "sample_mm"),
@@ -41,3 +43,10 @@ def test_default_camera_sees_about_sixty_degrees():
 def test_impossible_settings_are_refused(wrong, message):
     with pytest.raises(ArlightError, match=message):
         SynthesisSettings(**wrong)
+
+
+def test_exposure_is_locked_unless_it_is_asked_to_swing():
+    for time_s in (0.0, 1.7, 5.0):
+        np.testing.assert_array_equal(SynthesisSettings().gain(time_s), 1.0)
+    swinging = SynthesisSettings(exposure_swing=0.3, duration_s=4.0)
+    np.testing.assert_allclose([swinging.gain(t)[1] for t in (0.0, 1.0, 2.0, 3.0)], [1.0, 1.3, 1.0, 0.7])

@@ -124,3 +124,23 @@ def test_missing_environment_is_refused():
 def test_switch_without_a_second_light_is_refused():
     with pytest.raises(ArlightError, match="second environment"):
         captured_light(settings(light="switch"))
+
+
+@pytest.mark.usefixtures("needs_opengl")
+def test_automatic_exposure_scales_picture_and_truth_alike(layers):
+    locked = film(layers, duration_s=0.8, white=0.5)
+    auto = film(layers, duration_s=0.8, white=0.5, exposure_swing=0.3, white_balance_drift=0.2)
+    gains = []
+    for one, other in zip(locked, auto, strict=True):
+        gain = other.truth.coefficients[0].real / one.truth.coefficients[0].real
+        np.testing.assert_allclose(other.truth.coefficients, one.truth.coefficients * gain, rtol=1e-12)
+        assert other.truth.exposure == pytest.approx(one.truth.exposure * gain[1])
+        # medians: codes are rounded
+        before, after = one.frame.linear_rgb(), other.frame.linear_rgb()
+        seen = np.all((before > 0.05) & (after < 0.9), axis=-1)
+        np.testing.assert_allclose(np.median(after[seen] / before[seen], axis=0), gain, rtol=0.01)
+        gains.append(gain)
+    gains = np.array(gains)
+    assert gains[:, 1].max() == pytest.approx(1.3)
+    assert gains[:, 1].min() == pytest.approx(0.7)
+    np.testing.assert_allclose(gains[-1] / gains[-1, 1], [1.0 + 0.2 * 7 / 8, 1.0, 1.0 - 0.2 * 7 / 8])
