@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -23,20 +24,20 @@ from arlight.tracking.blocks import BlockMeter
 from arlight.video.reader import VideoReader
 
 ASSEMBLY = Assembly(paper=Print(Registration((0.15, -0.1), 0.2)), glass_scale=1.02)
+SETTINGS = SynthesisSettings(
+    camera=default_camera((640, 480)),
+    sheet_width_px=420.0,
+    duration_s=2.0,
+    frame_rate=Fraction(8),
+    bounces=1,
+)
 
 
 @pytest.fixture(scope="module")
 def assembled(tmp_path_factory):
     """A folder with orbit.mp4 of an order-1 sheet whose paper lies 0.18 mm off, under glass that is 2 % thicker."""
     folder = tmp_path_factory.mktemp("assembled")
-    settings = SynthesisSettings(
-        camera=default_camera((640, 480)),
-        sheet_width_px=420.0,
-        duration_s=2.0,
-        frame_rate=Fraction(8),
-        bounces=1,
-    )
-    write_clip(folder, "orbit", settings, design_probe(1), assembly=ASSEMBLY, preset="ultrafast")
+    write_clip(folder, "orbit", SETTINGS, design_probe(1), assembly=ASSEMBLY, preset="ultrafast")
     return folder
 
 
@@ -213,3 +214,23 @@ def test_another_sheet_s_matrix_is_refused(arlight, still, tmp_path):
     )  # fmt: skip
     assert done.status == 1
     assert "sheet.fixed.npz: is of another sheet" in done.errors
+
+
+def test_no_camera_and_automatic_exposure_cost_less_than_half_as_much_again(arlight, assembled, tmp_path):
+    write_clip(
+        tmp_path,
+        "auto",
+        replace(SETTINGS, exposure_swing=0.3, white_balance_drift=0.15),
+        design_probe(1),
+        assembly=ASSEMBLY,
+        preset="ultrafast",
+    )
+    (tmp_path / "camera.json").unlink()
+    save_assembly(ASSEMBLY, tmp_path / "sheet.json")
+    options = ("--no-render", "--calibration", "sheet.json", "--lighting")
+    for clip, log in ((assembled / "orbit.mp4", "locked.jsonl"), ("auto.mp4", "auto.jsonl")):
+        done = arlight("run", clip, *options, log)
+        assert done.status == 0, done.errors
+    locked, auto = errors("locked.jsonl", assembled), errors("auto.jsonl", tmp_path, "auto")
+    # errors below half a per cent are what one clip has by chance
+    assert np.all(auto < 1.5 * np.maximum(locked, 0.005)), (locked, auto)
