@@ -95,7 +95,8 @@ class LightingEstimator:
         lighting = self._lighting(fits, time_s)
         reflection = np.stack([fit.reflection for fit in fits], axis=1)
         stripes = _guide(np.stack([fit.predicted for fit in fits], axis=2), white)
-        learnt = replace(green.nuisance, color_spread=spreads, shape=_shape(green))
+        scales = tuple(fit.nuisance.error_scale[channel] for channel, fit in enumerate(fits))
+        learnt = replace(green.nuisance, color_spread=spreads, shape=_shape(green), error_scale=scales)
         return Estimate(lighting, stripes, reflection, learnt, green.unexplained)
 
     def _lighting(self, fits: tuple[ChannelFit, ...], time_s: float) -> Lighting:
