@@ -45,6 +45,13 @@ def turned(series: ComplexArray, lead_rad: Array) -> ComplexArray:
     return np.asarray(series * np.exp(1j * np.multiply.outer(lead_rad, harmonics)), complex)
 
 
+def convolution(series: ComplexArray) -> ComplexArray:
+    """(blocks, m, l) matrices that multiply series -H..H by the given ones (blocks, 2 H + 1), cut at H."""
+    size = series.shape[1]
+    index = np.subtract.outer(np.arange(size), np.arange(size)) + HARMONICS
+    return np.where((index >= 0) & (index < size), series[:, np.clip(index, 0, size - 1)], 0.0)
+
+
 def _film_profile(kind: BlockKind, design: Design) -> Profile:
     match kind, design:
         case "pattern", "matched":

@@ -15,6 +15,7 @@ from scipy.special import j0
 
 from arlight.estimation.layer_series import (
     HARMONICS,
+    convolution,
     film_series,
     paper_series,
     turned,
@@ -172,13 +173,6 @@ def upper_face_return(slab: Slab, frequency: ArrayLike) -> Array:
     radius = np.linalg.norm(slab.light_plane(np.stack([sine, 0 * sine, mu], axis=-1)), axis=-1)
     kernel = j0(2.0 * np.pi * np.multiply.outer(np.asarray(frequency, float), radius))
     return kernel @ (weight * face * (1.0 - face) ** 2)
-
-
-def convolution(series: ComplexArray) -> ComplexArray:
-    """(blocks, m, l) matrices that multiply series -H..H by the given ones (blocks, 2 H + 1), cut at H."""
-    size = series.shape[1]
-    index = np.subtract.outer(np.arange(size), np.arange(size)) + HARMONICS
-    return np.where((index >= 0) & (index < size), series[:, np.clip(index, 0, size - 1)], 0.0)
 
 
 def _hemisphere() -> tuple[Array, Array]:
