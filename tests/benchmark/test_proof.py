@@ -91,5 +91,5 @@ def test_each_flaw_is_left_out_alone():
 
 def test_a_clip_that_is_too_short_is_refused():
     known = TRACED / "known-apartment.mp4"
-    with pytest.raises(VideoError, match="known-apartment.*first 10"):
+    with pytest.raises(VideoError, match=r"known-apartment.*first 10"):
         judge(known, PROBE, Treatment("any", Assembly(film=Print()), CAMERA))
