@@ -22,6 +22,7 @@ COMMANDS = {
     "table": "TableOptions",
     "figures": "FiguresOptions",
     "trace": "TraceOptions",
+    "prove": "ProveOptions",
 }
 """Module below `arlight.commands` and class of options of every subcommand."""
 

@@ -14,6 +14,7 @@ from arlight.camera import Camera
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE, Interruption
 from arlight.commands.options import OptionalFile
 from arlight.errors import ArlightError
+from arlight.probe.assembly_storage import load_assembly
 from arlight.probe.layout import design_probe
 from arlight.probe.storage import load_probe
 from arlight.synthetic.clip import CRF, write_clip
@@ -22,6 +23,7 @@ from arlight.synthetic.motion import PathName
 from arlight.synthetic.sensor import Sensor
 from arlight.synthetic.settings import SynthesisSettings, default_camera
 from arlight.synthetic.synthesis import SyntheticFrame
+from arlight.tracking.block_layout import field_blocks
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class SynthesizeOptions:
     """camera.json of the camera that films; a phone-like one of the size asked for by default."""
     order: int = 5
     """Order of the sheet that is designed, 1 to 8."""
+    assembly: OptionalFile = None
+    """NAME.calibration.json of how the sheet was printed and put together; exactly as designed by default."""
     white: float = 0.6
     """Linear value of white paper under the brightest light: the exposure."""
     exposure_swing: float = 0.0
@@ -89,6 +93,7 @@ def run(options: SynthesizeOptions) -> int:
     """
     settings = _settings(options)
     probe = design_probe(options.order) if options.probe is None else load_probe(options.probe)
+    assembly = None if options.assembly is None else load_assembly(options.assembly, len(field_blocks(probe)))
     name = options.name or options.path
     with Interruption() as interruption, Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(escape(name), total=settings.frame_count)
@@ -99,7 +104,7 @@ def run(options: SynthesizeOptions) -> int:
                 raise KeyboardInterrupt
 
         try:
-            write_clip(options.output, name, settings, probe, crf=options.crf, watch=watch)
+            write_clip(options.output, name, settings, probe, assembly=assembly, crf=options.crf, watch=watch)
         except KeyboardInterrupt:
             return INTERRUPTED_EXIT_CODE
     Console(soft_wrap=True, highlight=False, markup=False).print(f"{options.output / name}.mp4")

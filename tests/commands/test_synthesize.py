@@ -2,10 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from arlight.probe.assembly import Assembly, Print, Registration
+from arlight.probe.assembly_storage import save_assembly
 from arlight.results.log import read_log
 from arlight.synthetic.truth import load_truth
+from arlight.video.reader import VideoReader
 
 QUICK = ("--order", 1, "--size", 320, 240, "--sheet-width-px", 230, "--seconds", 0.12)
 
@@ -53,6 +57,7 @@ def test_a_clip_that_is_there_is_not_replaced(arlight, tmp_path):
         (["--frame-rate", "25/0"], "--frame-rate 25/0: expected"),
         (["--probe", "none.json"], "none.json"),
         (["--camera", "none.json"], "none.json: cannot be read"),
+        (["--assembly", "none.json"], "none.json: cannot be read"),
         (["--light", "switch"], "needs a second environment"),
         (["--tilt-deg", "95"], "95"),
         (["--sensor.blur-px", "-1"], "blur_px"),
@@ -63,3 +68,14 @@ def test_bad_input_is_refused(arlight, tmp_path, arguments, message):
     assert done.status == 1
     assert message in done.errors
     assert not list(tmp_path.glob("clip/*"))
+
+
+def test_a_sheet_that_is_put_together_wrong_can_be_filmed(arlight, tmp_path):
+    save_assembly(Assembly(paper=Print(Registration((0.5, 0.0)))), tmp_path / "sheet.json")
+    assert arlight("synthesize", *QUICK, "--output", "right").status == 0
+    assert arlight("synthesize", *QUICK, "--output", "wrong", "--assembly", "sheet.json").status == 0
+    right, wrong = (next(iter(VideoReader(tmp_path / name / "orbit.mp4"))) for name in ("right", "wrong"))
+    changed = np.abs(right.linear_luma() - wrong.linear_luma())
+    # the stripes are others, the frame with its markers is the same
+    assert changed[100:140, 130:190].mean() > 0.008
+    assert np.median(changed) < 0.002
