@@ -16,7 +16,7 @@ from arlight.calibration.self_calibration import SelfCalibration
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
 from arlight.commands.self_calibration import self_calibrate_clip
-from arlight.errors import VideoError
+from arlight.errors import CalibrationError, VideoError
 from arlight.probe.assembly import Assembly
 from arlight.probe.assembly_storage import load_assembly, load_vignetting
 from arlight.probe.design import Probe
@@ -62,13 +62,19 @@ def run(options: ProveOptions) -> int:
     results: list[ClipResult] = []
     found: dict[str, SelfCalibration] = {}
     for clip in clips:
-        found[clip.stem] = self_calibrate_clip(clip, probe, camera)
+        try:
+            found[clip.stem] = self_calibrate_clip(clip, probe, camera)
+        except CalibrationError as error:
+            console.print(f"left out: {error}")
+            continue
         own = calibrated(_SELF, found[clip.stem], camera)
         for treatment in [Treatment(_AS_DESIGNED, None, camera), own, *_known(options.known, probe, camera)]:
             results.append(judge(clip, probe, treatment))
         if options.flaws and clip.stem.startswith(options.paths[0]):
             results.extend(judge(clip, probe, treatment) for treatment in uncorrected(own, camera))
         console.print(f"{clip}: {_summary(results[-1])}")
+    if not results:
+        raise VideoError(f"{options.folder}: none of its clips could be calibrated on; trace them again")
     console.print(_error_table(results))
     console.print(_sheet_table(found, true))
     if options.output is not None:
