@@ -14,10 +14,10 @@ from arlight.calibration.known_lighting_views import LitView
 from arlight.calibration.sheet_view import PredictedSheet, SheetView
 from arlight.estimation.resampling import measured_frequencies
 from arlight.estimation.response import optical_transfer
+from arlight.estimation.stripe_rows import turned_rows
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import BlockLayout
-from arlight.tracking.block_means import HARMONICS
 
 Array = NDArray[np.float64]
 
@@ -134,13 +134,10 @@ class SheetModel:
     def _lit(self, sheet: SheetView) -> tuple[Array, Array]:
         """Rows (blocks, 7, 3) of the light, and (blocks, 7) of the lower face's mirror reflection."""
         packed, places = self._packed[sheet.light], self.sheet.response.places
+        lower = self.sheet.lower_mirror(sheet)
         if not self._echoes:
-            rows, lower = self.sheet.rows(sheet)
-            return np.einsum("brk,bkc->brc", rows, packed[places]), lower
-        lit = []
-        for light in packed.T:
-            rows, lower = self.sheet.rows(sheet, light / light[0])
-            lit.append(np.einsum("brk,bk->br", rows, light[places]))
+            return np.einsum("brk,bkc->brc", self.sheet.light(sheet), packed[places]), lower
+        lit = [np.einsum("brk,bk->br", self.sheet.light(sheet, light / light[0]), light[places]) for light in packed.T]
         return np.stack(lit, axis=-1), lower
 
     def _turned(self, sheet: SheetView, tilt: Array) -> SheetView:
@@ -195,15 +192,3 @@ class Linearisation:
         for change, step in zip(np.diag(VIEW_STEPS), VIEW_STEPS, strict=True):
             shared.append((self._base.predict(view, own + change, exposure).rows - base) / step)
         return np.stack(shared, axis=-1), np.stack(slopes(self._blocks, BLOCK_STEPS), axis=-1)
-
-
-def turned_rows(rows: Array, turn: Array) -> Array:
-    """Rows (blocks, 7, ...) of stripes whose phase is ahead by `turn` (blocks,) of the phase they are told in [rad]."""
-    out = rows.copy()
-    shape = (-1,) + (1,) * (rows.ndim - 2)
-    for m in range(1, HARMONICS + 1):
-        cosine, sine = (wave(m * turn).reshape(shape) for wave in (np.cos, np.sin))
-        even, odd = rows[:, 2 * m - 1], rows[:, 2 * m]
-        out[:, 2 * m - 1] = even * cosine + odd * sine
-        out[:, 2 * m] = odd * cosine - even * sine
-    return out

@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 from arlight.calibration.known_lighting_model import ViewPrediction
 from arlight.calibration.known_lighting_views import LitView
+from arlight.estimation.lamps import BesideLamps
 from arlight.estimation.response import optical_transfer
+from arlight.estimation.robust_weights import block_weights, harmonic_squares
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL, row_variance
+from arlight.estimation.stripe_rows import usable_rows
 
 Array = NDArray[np.float64]
 
@@ -22,8 +25,6 @@ _TO_SHADING = 0.5
 """The same, relative to how uneven the block is."""
 _EVEN = 0.005
 """Slope that noise and codec give an even block, relative to white."""
-_WEAKEST_TRANSFER = 0.12
-"""Harmonics that blur has taken below this share are not used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +67,16 @@ class RowModel:
             variance = row_variance(means, channel, float(level[channel]), mean_model)
             variance = variance + (self.tolerance * level[channel]) ** 2
             extra = self._extra(view, prediction, channel, float(level[channel]))
-            left = residual[..., channel]
-            weight, squared[:, channel] = _block_weights(left**2 / variance, usable)
-            precision[channel] = _without_extra(
-                np.where(usable, weight[:, None] / variance, 0.0), prediction.mirror, extra
-            )
+            relative = residual[..., channel] ** 2 / variance
+            total, count = harmonic_squares(relative, usable)
+            squared[:, channel] = total / np.maximum(count, 1)
+            weight = block_weights(relative, usable, _FREEDOM)
+            rows = np.where(usable, weight[:, None] / variance, 0.0)
+            precision[channel] = BesideLamps.of(rows, prediction.mirror, extra).precision
         return WeightedView(residual, precision, squared)
 
     def _usable(self, view: LitView, transfer: Array) -> NDArray[np.bool_]:
-        order = np.repeat(np.arange(1, transfer.shape[1] // 2 + 1), 2)
-        usable = np.ones(transfer.shape, bool)
-        usable[:, 1:] = (order <= view.sheet.means.harmonics[:, None]) & (transfer[:, 1:] > _WEAKEST_TRANSFER)
-        return usable & (view.sheet.means.valid & (self.order <= self.highest_order))[:, None]
+        return usable_rows(view.sheet.means, transfer) & (self.order <= self.highest_order)[:, None]
 
     def _extra(self, view: LitView, prediction: ViewPrediction, channel: int, level: float) -> Array:
         """(blocks,) variance of what a block mirrors beside the prediction; wider where the mean shows a lamp."""
@@ -97,23 +96,3 @@ def white_level(view: LitView, white: NDArray[np.bool_]) -> Array:
         return np.asarray(np.maximum(np.median(seen, axis=0), 1e-3), float)
     every = means.values[means.valid, 0]
     return np.asarray(np.maximum(8.0 * np.median(every, axis=0), 1e-3), float) if len(every) else np.full(3, 0.5)
-
-
-def _without_extra(precision: Array, mirror: Array, extra: Array) -> Array:
-    """Precision matrices (blocks, 7, 7) when each block mirrors an unknown extra of variance (blocks,).
-
-    Sherman-Morrison on diag(1/p) + extra m m'.
-    """
-    seen = precision * mirror
-    shrink = extra / (1.0 + extra * np.sum(seen * mirror, axis=1))
-    matrices = -shrink[:, None, None] * seen[:, :, None] * seen[:, None, :]
-    diagonal = np.arange(precision.shape[1])
-    matrices[:, diagonal, diagonal] += precision
-    return matrices
-
-
-def _block_weights(squared: Array, usable: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Student-t weight (blocks,) by all harmonics of a block together, and their mean square (blocks,)."""
-    count = np.sum(usable[:, 1:], axis=1)
-    total = np.sum(np.where(usable[:, 1:], squared[:, 1:], 0.0), axis=1)
-    return (_FREEDOM + count) / (_FREEDOM + total), total / np.maximum(count, 1)

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.layer_fit import LayerFit, LayerSolution
+from arlight.calibration.layer_fit import SETTLED, LayerFit, LayerSolution
 from arlight.calibration.layer_parameters import EXPECTED, NAMES, STDDEV, assembly_of
+from arlight.calibration.sheet_blocks import coarse_part
 from arlight.calibration.view_measurement import SeenSheet, ViewMeter, light_plane_points, varied
 from arlight.camera import Camera
 from arlight.errors import CalibrationError
@@ -23,10 +24,12 @@ Array = NDArray[np.float64]
 VIEWS = 20
 """Views that are measured; more add little, for the errors of codecs and models repeat from view to view."""
 _LEAST_VIEWS = 4
-_LEAST_SPREAD = 0.04
-"""Rms distance of the views from their mean on the light plane, whose disk has radius 1/2; 0.04 is about 10 degrees."""
+_LEAST_SPREAD = 0.015
+"""Rms distance of the views from their mean on the light plane, whose disk has radius 1/2; 0.015 is about 4 degrees."""
 _ORDERS = (1, 2, 3)
 """Coarse stripes are fitted first: fine ones repeat within what a hand may misplace."""
+_COARSELY_SETTLED = 0.1
+"""Where a fit to coarse stripes stops, which only leads to the next one; as `SETTLED`."""
 _PASSES = 2
 """Fits, each to views measured with the film where the last one found it."""
 _DETERMINED = 0.5
@@ -86,7 +89,8 @@ def self_calibrate(
             progress(done := done + 1, total)
         orders = [order for order in _ORDERS if order < probe.order] if number == 0 else []
         for order in [*orders, probe.order]:
-            solution = LayerFit(probe, views).solve(vector, order)
+            settled = SETTLED if order == probe.order else _COARSELY_SETTLED
+            solution = LayerFit(*coarse_part(probe, views, order)).solve(vector, settled)
             vector = solution.vector
             progress(done := min(done + 1, total), total)
         assembly = assembly_of(vector)
@@ -128,5 +132,5 @@ def _check_motion(seen: Sequence[SeenSheet], probe: Probe) -> None:
     if spread < _LEAST_SPREAD:
         raise CalibrationError(
             f"the camera hardly moved around the sheet: its directions spread by {spread:.3f} on the light plane, and "
-            f"{_LEAST_SPREAD} are needed, about 10 degrees; film a few seconds while moving around and over the sheet"
+            f"{_LEAST_SPREAD} are needed, about 4 degrees; film a few seconds while moving around and over the sheet"
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from arlight.estimation.prior import COLOR_SPREAD
 from arlight.estimation.response import optical_transfer
-from arlight.tracking.block_means import HARMONICS
+from arlight.estimation.stripe_rows import HARMONIC_OF_ROW, turned_rows
 
 Array = NDArray[np.float64]
 
@@ -57,12 +57,7 @@ class Nuisance:
 
     def shifted(self, rows: Array, cycles_per_px: Array) -> Array:
         """Rows (blocks, 7, ...) as they appear when all stripes are shifted."""
-        angle = _waves(cycles_per_px)[:, 1::2] @ np.array(self.shift_px)
-        turn = np.exp(-1j * angle)
-        series = (rows[:, 1::2] - 1j * rows[:, 2::2]) * turn.reshape(turn.shape + (1,) * (rows.ndim - 2))
-        shifted = rows.copy()
-        shifted[:, 1::2], shifted[:, 2::2] = series.real, -series.imag
-        return shifted
+        return turned_rows(rows, -2.0 * np.pi * cycles_per_px @ np.array(self.shift_px))
 
     def slopes(self, predicted: Array, mirrored: Array, cycles_per_px: Array) -> Array:
         """Change (blocks, 7, 5) of the rows with blur, sharpness, lower face and shift.
@@ -102,8 +97,7 @@ class Nuisance:
 
 def _waves(cycles_per_px: Array) -> Array:
     """(blocks, 7, 2) wave numbers of the rows' harmonics [rad/px]; 0 for the means."""
-    harmonic = np.concatenate([[0], np.repeat(np.arange(1, HARMONICS + 1), 2)])
-    return 2.0 * np.pi * harmonic[:, None] * cycles_per_px[:, None, :]
+    return 2.0 * np.pi * HARMONIC_OF_ROW[:, None] * cycles_per_px[:, None, :]
 
 
 def _fineness(wave: Array) -> Array:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.estimation.stripe_rows import HARMONIC_OF_ROW
 from arlight.tracking.block_means import ROWS, BlockMeans
 
 Array = NDArray[np.float64]
@@ -97,8 +98,7 @@ def row_noise(means: BlockMeans, channel: int, white: float, mean_model: Array, 
     pixels = means.covariance * pixel[:, None, None]
     model, inferred = np.zeros((2, len(pixels), ROWS))
     model[:, 0] = (mean_model * white) ** 2
-    order = np.repeat(np.arange(1.0, model.shape[1] // 2 + 1), 2)
-    cycles = np.hypot(*means.cycles_per_px.T)[:, None] * order
+    cycles = np.hypot(*means.cycles_per_px.T)[:, None] * HARMONIC_OF_ROW[1:]
     model[:, 1:] = (white * (_SWING_MODEL + _CODEC * (2.0 * cycles) ** 2)) ** 2
     swing = np.repeat(np.hypot(means.values[:, 1::2, channel], means.values[:, 2::2, channel]), 2, axis=1)
     model[:, 1:] += (_TRANSFER * np.log(np.maximum(transfer[:, 1:], _FAINTEST)) * swing) ** 2

@@ -8,6 +8,7 @@ depend on the view.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -175,6 +176,7 @@ def upper_face_return(slab: Slab, frequency: ArrayLike) -> Array:
     return kernel @ (weight * face * (1.0 - face) ** 2)
 
 
+@cache
 def _hemisphere() -> tuple[Array, Array]:
     """Gauss nodes mu and weights of 2 mu d mu over the cosine-weighted hemisphere."""
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
