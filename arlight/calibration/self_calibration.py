@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.layer_fit import SETTLED, LayerFit, LayerSolution
+from arlight.calibration.layer_fit import LayerFit, LayerSolution
 from arlight.calibration.layer_parameters import EXPECTED, NAMES, STDDEV, assembly_of
 from arlight.calibration.sheet_blocks import coarse_part
+from arlight.calibration.sheet_view import SheetView
 from arlight.calibration.view_measurement import SeenSheet, ViewMeter, light_plane_points, varied
 from arlight.camera import Camera
 from arlight.errors import CalibrationError
@@ -28,10 +29,8 @@ _LEAST_SPREAD = 0.015
 """Rms distance of the views from their mean on the light plane, whose disk has radius 1/2; 0.015 is about 4 degrees."""
 _ORDERS = (1, 2, 3)
 """Coarse stripes are fitted first: fine ones repeat within what a hand may misplace."""
-_COARSELY_SETTLED = 0.1
-"""Where a fit to coarse stripes stops, which only leads to the next one; as `SETTLED`."""
-_PASSES = 2
-"""Fits, each to views measured with the film where the last one found it."""
+_NEARLY_SETTLED = 1.0
+"""Where a fit stops that only leads to the next one; as `SETTLED`."""
 _DETERMINED = 0.5
 """Share of its prior deviation that a parameter's deviation must fall below to count as measured."""
 _NECESSARY = ("paper_x_mm", "paper_y_mm", "glass_scale")
@@ -79,22 +78,26 @@ def self_calibrate(
     """
     _check_motion(seen, probe)
     chosen = varied(seen, probe, VIEWS)
-    total = _PASSES * (len(chosen) + 2) + len(_ORDERS)
+    orders = [order for order in _ORDERS if order < probe.order]
+    total = 2 * len(chosen) + len(orders) + 2
     done = 0
-    vector, solution, assembly = EXPECTED.copy(), None, Assembly()
-    for number in range(_PASSES):
+
+    def measured(assembly: Assembly) -> list[SheetView]:
+        nonlocal done
         meter, views = ViewMeter(probe, camera, assembly), []
         for view in chosen:
             views.append(meter.measure(view))
             progress(done := done + 1, total)
-        orders = [order for order in _ORDERS if order < probe.order] if number == 0 else []
-        for order in [*orders, probe.order]:
-            settled = SETTLED if order == probe.order else _COARSELY_SETTLED
-            solution = LayerFit(*coarse_part(probe, views, order)).solve(vector, settled)
-            vector = solution.vector
-            progress(done := min(done + 1, total), total)
-        assembly = assembly_of(vector)
-    assert solution is not None
+        return views
+
+    vector = EXPECTED
+    views = measured(Assembly())
+    for order in [*orders, probe.order]:
+        vector = LayerFit(*coarse_part(probe, views, order)).solve(vector, _NEARLY_SETTLED).vector
+        progress(done := done + 1, total)
+    # again with the film where it was found
+    solution = LayerFit(probe, measured(assembly_of(vector))).solve(vector)
+    progress(total, total)
     return _result(solution, len(chosen))
 
 

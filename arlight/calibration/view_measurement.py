@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from arlight.calibration.sheet_view import SheetView
 from arlight.camera import Camera
-from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import LightingEstimator
+from arlight.estimation.nuisance import Nuisance
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.blocks import BlockMeter
@@ -20,8 +20,8 @@ from arlight.video.frame import Frame
 
 Array = NDArray[np.float64]
 
-_PASSES = 2
-"""Measurements of a view: the first one shows what stripes the second has to expect."""
+_REPEATS = 2
+"""How often a view is measured again with the stripes to expect, as the last measurement shows them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +86,13 @@ class ViewMeter:
 
     def measure(self, seen: SeenSheet) -> SheetView:
         """Measure one view by itself."""
-        pose = seen.pose.camera_from_probe
+        pose, time_s = seen.pose.camera_from_probe, seen.frame.time_s
         assert pose is not None
-        nuisance, stripes = Nuisance(seen.pose.blur_px**2), None
-        for _ in range(_PASSES):
-            means = self._meter.measure(seen.frame, pose, seen.pose.blur_px, stripes)
-            estimate = self._estimator.estimate(means, seen.frame.time_s, nuisance)
-            nuisance, stripes = estimate.nuisance, estimate.stripes
-        means = self._meter.measure(seen.frame, pose, seen.pose.blur_px, stripes)
+        nuisance = Nuisance(seen.pose.blur_px**2)
+        means = self._meter.measure(seen.frame, pose, seen.pose.blur_px)
+        for _ in range(_REPEATS):
+            estimate = self._estimator.estimate(means, time_s, nuisance)
+            nuisance = estimate.nuisance
+            means = self._meter.measure(seen.frame, pose, seen.pose.blur_px, estimate.stripes)
         blur_px = float(np.sqrt(nuisance.blur_variance_px2))
         return SheetView.of(means, self._assembly, self._probe, self._camera, pose, blur_px, seen.light)
