@@ -167,8 +167,8 @@ def _mismatch(footage: Footage, unexplained: float) -> ProbeError:
         f"{footage.probe_path}: does not match the footage: {footage.reader.path} shows its markers, but stripes "
         f"between them that no light explains ({100.0 * unexplained:.0f} % of a typical block's are left over, up to "
         f"{100.0 * _UNEXPLAINED_LIMIT:.0f} % can be); give the probe.json of the sheet that was filmed (--probe FILE), "
-        "check its glass_mm and refractive_index and that film and paper lie as the guide has them; a video that is "
-        "compressed until its stripes are torn looks the same"
+        "check its glass_mm and refractive_index and that film and paper lie as the guide has them, or have the sheet "
+        "calibrated as it lies (--self-calibrate); a video that is compressed until its stripes are torn looks the same"
     )
 
 
