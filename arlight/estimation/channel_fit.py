@@ -83,20 +83,9 @@ def fit_channel(
     for _ in range(_ITERATIONS):
         done = task.iterate(nuisance, lamp, weights)
         nuisance, lamp, weights = done.nuisance, done.lamp, done.weights
-    inverse = np.asarray(np.linalg.inv(done.normal), float)
-    packed = done.solution[: len(done.solution) - system.field_size]
     predicted = task.values - done.residual
-    squared, usable = done.weights[:, None] * done.squared, done.model.usable
-    return ChannelFit(
-        packed=packed,
-        covariance=_covariance(packed, inverse + done.beside.carried @ done.doubt @ done.beside.carried.T),
-        field=done.field,
-        reflection=done.field + done.extra,
-        predicted=predicted,
-        chi2=float(np.mean(squared[usable])) if np.any(usable) else float("nan"),
-        unexplained=unexplained_share(means, channel, white, predicted, done.model.transfer),
-        nuisance=nuisance.rescaled(channel, task.scales(done, inverse)),
-    )
+    unexplained = unexplained_share(means, channel, white, predicted, done.model.transfer)
+    return task.finished(done, predicted, unexplained)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +186,23 @@ class _Task:
             lamps.granted(extra, self.ordinary), block_weights(squared, model.usable),
         )  # fmt: skip
 
-    def scales(self, done: _Iteration, inverse: Array) -> tuple[float, float]:
+    def finished(self, done: _Iteration, predicted: Array, unexplained: float) -> ChannelFit:
+        """The last solution, with how certain it is."""
+        inverse = np.asarray(np.linalg.inv(done.normal), float)
+        packed = done.solution[: len(done.solution) - self.system.field_size]
+        squared, usable = done.weights[:, None] * done.squared, done.model.usable
+        return ChannelFit(
+            packed=packed,
+            covariance=_covariance(packed, inverse + done.beside.carried @ done.doubt @ done.beside.carried.T),
+            field=done.field,
+            reflection=done.field + done.extra,
+            predicted=predicted,
+            chi2=float(np.mean(squared[usable])) if np.any(usable) else float("nan"),
+            unexplained=unexplained,
+            nuisance=done.nuisance.rescaled(self.channel, self._scales(done, inverse)),
+        )
+
+    def _scales(self, done: _Iteration, inverse: Array) -> tuple[float, float]:
         """Variance of the model's errors in means and harmonics for the next frame, by this one's residuals."""
         model = done.model
         left = done.precision - self.system.explained(inverse, model.design, model.mirror, done.precision)
