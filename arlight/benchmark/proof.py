@@ -101,7 +101,7 @@ def calibrated(name: str, found: SelfCalibration, camera: Camera) -> Treatment:
     return Treatment(name, found.assembly, replace(camera, vignetting=(float(own[0]), float(own[1]), float(own[2]))))
 
 
-def uncorrected(whole: Treatment, plain_camera: Camera) -> Iterator[Treatment]:
+def uncorrected(whole: Treatment) -> Iterator[Treatment]:
     """The treatment with one flaw of the sheet or the camera at a time left uncorrected."""
     sheet = whole.assembly or Assembly()
     film, paper = sheet.film, sheet.paper
@@ -124,7 +124,7 @@ def uncorrected(whole: Treatment, plain_camera: Camera) -> Iterator[Treatment]:
         ("grey ink", lambda layer: replace(layer, solid=0.0)),
     ):
         yield replace(whole, name=name, assembly=replace(sheet, film=undone(film), paper=undone(paper)))
-    yield replace(whole, name="vignetting", camera=plain_camera)
+    yield replace(whole, name="vignetting", camera=replace(whole.camera, vignetting=None))
     yield replace(whole, name="light bounced in the sheet", settings=replace(whole.settings, bounces=False))
 
 

@@ -23,6 +23,8 @@ from arlight.probe.design import Probe
 from arlight.probe.storage import load_probe
 from arlight.tracking.block_layout import field_blocks
 
+_WIDTH = 140
+"""Of the tables, in characters: their rows are not to be wrapped."""
 _AS_DESIGNED, _SELF, _KNOWN = "as designed", "self-calibrated", "known light"
 
 
@@ -58,7 +60,7 @@ def run(options: ProveOptions) -> int:
     clips = [clip for path in options.paths for clip in sorted(options.folder.glob(f"{path}-*.mp4"))]
     if not clips:
         raise VideoError(f"{options.folder}: no clips {options.paths[0]}-*.mp4; make them with `arlight trace`")
-    console = Console(soft_wrap=True, highlight=False, markup=False)
+    console = Console(soft_wrap=True, highlight=False, markup=False, width=_WIDTH)
     results: list[ClipResult] = []
     found: dict[str, SelfCalibration] = {}
     for clip in clips:
@@ -71,7 +73,7 @@ def run(options: ProveOptions) -> int:
         for treatment in [Treatment(_AS_DESIGNED, None, camera), own, *_known(options.known, probe, camera)]:
             results.append(judge(clip, probe, treatment))
         if options.flaws and clip.stem.startswith(options.paths[0]):
-            results.extend(judge(clip, probe, treatment) for treatment in uncorrected(own, camera))
+            results.extend(judge(clip, probe, treatment) for treatment in uncorrected(own))
         console.print(f"{clip}: {_summary(results[-1])}")
     if not results:
         raise VideoError(f"{options.folder}: none of its clips could be calibrated on; trace them again")
