@@ -6,15 +6,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from arlight.calibration.known_lighting_light import KnownLight
 from arlight.calibration.self_calibration import SelfCalibration, self_calibrate
 from arlight.calibration.sheet_view import SheetView
 from arlight.calibration.view_measurement import SeenSheet, ViewMeter, find_sheet
 from arlight.camera import Camera
 from arlight.errors import RenderingUnavailableError
-from arlight.fourier import pack_real
+from arlight.estimation.resampling import measured_frequencies
 from arlight.probe.assembly import Assembly, Print, Registration
 from arlight.probe.design import Probe
 from arlight.probe.layout import design_probe
+from arlight.synthetic.captured import load_environment
 from arlight.synthetic.sensor import Sensor
 from arlight.synthetic.settings import SynthesisSettings, default_camera
 from arlight.synthetic.synthesis import synthesize
@@ -26,6 +28,7 @@ MISASSEMBLED = Assembly(
     Print(Registration((-0.07, 0.09), -0.25), blur_mm=0.08, dot_gain=0.08, solid=0.03),
     glass_scale=1.025,
 )
+LIGHT = "studio"
 FRAMES = 8
 
 
@@ -45,7 +48,7 @@ class FilmedSheet:
 def filmed_sheet() -> FilmedSheet:
     probe = design_probe(order=2, pixels_per_mm=12)
     settings = SynthesisSettings(
-        environment="studio",
+        environment=LIGHT,
         path="orbit",
         camera=default_camera((640, 480)),
         sheet_width_px=420.0,
@@ -79,5 +82,7 @@ def measured_views(filmed_sheet: FilmedSheet) -> list[SheetView]:
 
 @pytest.fixture(scope="session")
 def true_light(filmed_sheet: FilmedSheet) -> np.ndarray:
-    """(2k - 1,) real-packed green coefficients; the light is constant."""
-    return pack_real(filmed_sheet.truth[0].coefficients)[:, 1]
+    """(2k - 1,) real-packed green coefficients of the light, at the frequencies that the assembled sheet measures."""
+    environment = load_environment(LIGHT).scaled(filmed_sheet.truth[0].exposure)
+    light = KnownLight(LIGHT, environment, filmed_sheet.probe.refractive_index)
+    return light.packed(measured_frequencies(filmed_sheet.probe, filmed_sheet.assembly))[:, 1]

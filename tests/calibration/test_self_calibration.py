@@ -105,7 +105,7 @@ def test_few_views_are_refused(filmed_sheet):
 
 
 def test_a_camera_that_stands_still_is_refused(filmed_sheet):
-    with pytest.raises(CalibrationError, match="hardly moved around the sheet: .* film a few seconds while moving"):
+    with pytest.raises(CalibrationError, match=r"hardly moved around the sheet: .* film a few seconds while moving"):
         self_calibrate(filmed_sheet.seen[:1] * 12, filmed_sheet.probe, filmed_sheet.camera)
 
 
@@ -119,5 +119,5 @@ def test_a_covered_sheet_is_refused(filmed_sheet):
         cv2.fillConvexPoly(image, np.rint(outline).astype(np.int32), (60, 60, 60))
         return replace(seen, frame=Frame.from_rgb(image, seen.frame.index, seen.frame.time_s))
 
-    with pytest.raises(CalibrationError, match="do not tell .* from the light .* move the camera further"):
+    with pytest.raises(CalibrationError, match=r"do not tell .* from the light .* move the camera further"):
         self_calibrate([covered(seen) for seen in filmed_sheet.seen], filmed_sheet.probe, filmed_sheet.camera)

@@ -99,7 +99,7 @@ def test_the_exposures_level_is_not_judged():
 
 
 def test_forgetting_begins_again_and_another_light_does_not():
-    common, memory, _ = averaged(errors(0.2, 3.0, 200))
+    common, _, _ = averaged(errors(0.2, 3.0, 200))
     learnt = common.independent
     common.start(TRUTH, COVARIANCE)
     assert common.independent == learnt
