@@ -7,7 +7,9 @@ from typing import Protocol
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from arlight.calibration.exposure import ExposureMeter
 from arlight.camera import Camera
+from arlight.errors import ProbeError
 from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
@@ -100,6 +102,7 @@ class LightingTracker:
         self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
         self._estimator = estimator or LightingEstimator(probe, assembly, bounces=self._settings.bounces)
         self._filter = LightingFilter()
+        self._exposure = _exposure_meter(probe, camera)
         self.reset()
 
     def reset(self) -> None:
@@ -107,6 +110,7 @@ class LightingTracker:
         self._tracker.reset()
         self._filter.reset()
         self._last: Estimate | None = None
+        self._level = np.ones(3)
 
     def update(self, frame: Frame) -> FrameEstimate:
         """Pose and lighting of the next frame.
@@ -126,7 +130,7 @@ class LightingTracker:
         estimate, measured = self._estimate(frame, pose)
         raw = None if estimate is None else self._cut(estimate.lighting)
         estimated = perf_counter()
-        lighting = self._filter.update(raw, frame.time_s) if self._settings.filtered else raw
+        lighting = self._filtered(raw, frame, pose) if self._settings.filtered else raw
         timings = {
             "track": tracked - start,
             "measure": measured - tracked,
@@ -152,6 +156,23 @@ class LightingTracker:
         self._last = last
         return last, measured
 
+    def _filtered(self, raw: Lighting | None, frame: Frame, pose: ProbePose) -> Lighting | None:
+        """The light over time, relative to the frame's white paper: a change of exposure is no change of light."""
+        if self._exposure is not None and pose.camera_from_probe is not None:
+            seen = self._exposure.measure(frame, pose.camera_from_probe)
+            self._level = seen.level if seen.valid else self._level
+        relative = None if raw is None else raw.scaled(1.0 / self._level)
+        lighting = self._filter.update(relative, frame.time_s)
+        return None if lighting is None else lighting.scaled(self._level)
+
     def _cut(self, lighting: Lighting) -> Lighting:
         order = self._settings.order
         return lighting if order is None else lighting.truncated(order)
+
+
+def _exposure_meter(probe: Probe, camera: Camera) -> ExposureMeter | None:
+    """None for sheets whose frame shows too little blank paper."""
+    try:
+        return ExposureMeter(probe, camera)
+    except ProbeError:
+        return None

@@ -46,6 +46,14 @@ class Lighting:
             covariance=self.covariance[:, packed][:, :, packed],
         )
 
+    def scaled(self, factor: NDArray[np.float64]) -> "Lighting":
+        """The same light as another exposure records it, each channel multiplied by its factor (3,)."""
+        return replace(
+            self,
+            coefficients=self.coefficients * factor,
+            covariance=self.covariance * factor[:, None, None] ** 2,
+        )
+
     @property
     def stddev(self) -> NDArray[np.float64]:
         """(k, 3) standard deviation of |L~_n|'s error: sqrt(var Re + var Im) [radiance * sr]."""

@@ -82,3 +82,17 @@ def test_cut_to_an_order_it_keeps_what_is_left(order):
 def test_an_order_beyond_its_own_is_refused(order):
     with pytest.raises(ProbeError, match=f"order {order} was asked for: the sheet measures orders 0 to 3"):
         lighting_of(3).truncated(order)
+
+
+def test_another_exposure_scales_light_and_error_bars():
+    generator = np.random.default_rng(7)
+    frequencies = np.array([[0, 0], [1, 0]])
+    factors = generator.normal(size=(3, 3, 3))
+    lighting = Lighting(
+        frequencies, generator.normal(size=(2, 3)) + 1j, factors @ factors.swapaxes(1, 2) + np.eye(3), 0.0, 1.0
+    )
+    exposure = np.array([0.5, 1.0, 3.0])
+    brighter = lighting.scaled(exposure)
+    np.testing.assert_allclose(brighter.coefficients, lighting.coefficients * exposure)
+    np.testing.assert_allclose(brighter.stddev, lighting.stddev * exposure)
+    np.testing.assert_allclose(brighter.scaled(1 / exposure).covariance, lighting.covariance)
