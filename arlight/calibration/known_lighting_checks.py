@@ -12,8 +12,8 @@ from arlight.calibration.known_lighting_views import measure
 from arlight.calibration.view_measurement import SeenSheet
 from arlight.camera import Camera
 from arlight.errors import CalibrationError
-from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import LightingEstimator
+from arlight.estimation.nuisance import Nuisance
 from arlight.fourier import frequency_order, unpack_real
 from arlight.probe.design import Probe
 

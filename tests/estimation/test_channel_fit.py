@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arlight.estimation.channel_fit import Nuisance, fit_channel
+from arlight.estimation.channel_fit import fit_channel
 from arlight.estimation.normal_equations import BlockSystem
+from arlight.estimation.nuisance import Nuisance
 from arlight.fourier import pack_real
 from arlight.tracking.block_layout import field_blocks
 
