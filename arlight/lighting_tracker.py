@@ -7,13 +7,13 @@ from typing import Protocol
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from arlight.calibration.exposure import ExposureMeter
+from arlight.calibration.camera.exposure import ExposureMeter
 from arlight.camera import Camera
 from arlight.errors import ProbeError
-from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.nuisance import Nuisance
 from arlight.fourier import orders_up_to
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe

@@ -12,10 +12,10 @@ from arlight.benchmark.matte_ball import harmonics, matte_ball_light
 from arlight.benchmark.probe_scene import MATTE_REFLECTANCE, MIRROR_REFLECTANCE, LitScene, ProbeScene
 from arlight.benchmark.relit_objects import RelitObjects
 from arlight.benchmark.sheet_light import SheetLight
-from arlight.calibration.ball_capture import CapturedBall, CaptureSettings, capture_ball
-from arlight.calibration.ball_outline import BallOutline
-from arlight.calibration.mirror_ball import MapGrid
-from arlight.calibration.photographs import Photograph
+from arlight.calibration.ball.ball_capture import CapturedBall, CaptureSettings, capture_ball
+from arlight.calibration.ball.ball_outline import BallOutline
+from arlight.calibration.ball.mirror_ball import MapGrid
+from arlight.calibration.ball.photographs import Photograph
 from arlight.environment import Environment
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from arlight.benchmark.comparison import METHODS, ComparedLight
 from arlight.benchmark.relit_objects import MATERIALS, Material
-from arlight.calibration.mirror_ball import MapGrid
+from arlight.calibration.ball.mirror_ball import MapGrid
 from arlight.camera import Pose
 from arlight.environment import Environment
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.benchmark.probe_scene import MIRROR_REFLECTANCE, LitScene, ProbeScene
-from arlight.calibration.ball_capture import capture_ball
+from arlight.calibration.ball.ball_capture import capture_ball
 from arlight.environment import Environment
 from arlight.errors import ArlightError
 from arlight.estimation.lighting import Lighting

@@ -7,8 +7,8 @@ irradiance holds hardly more than nine coefficients of the light.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arlight.calibration.ball_outline import MirrorGeometry, camera_rays
-from arlight.calibration.mirror_ball import BallPicture
+from arlight.calibration.ball.ball_outline import MirrorGeometry, camera_rays
+from arlight.calibration.ball.mirror_ball import BallPicture
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.benchmark.ball_scene import Ball, Finish, SurroundingLight, with_ball
-from arlight.calibration.photographs import Photograph
+from arlight.calibration.ball.photographs import Photograph
 from arlight.camera import Camera, Pose
 from arlight.environment import Environment
 from arlight.estimation.lighting import Lighting

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.benchmark.consistency import consistency
-from arlight.calibration.self_calibration import SelfCalibration
+from arlight.calibration.layers.self_calibration import SelfCalibration
 from arlight.camera import Camera
 from arlight.errors import VideoError
 from arlight.estimation.lighting import Lighting

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arlight.calibration.mirror_ball import MapGrid
+from arlight.calibration.ball.mirror_ball import MapGrid
 from arlight.rendering.reconstruction import hemisphere_points
 
 Array = NDArray[np.float64]

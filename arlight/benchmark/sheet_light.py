@@ -9,7 +9,7 @@ went through (G + N)(G + N + S)^-1.
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.mirror_ball import MapGrid
+from arlight.calibration.ball.mirror_ball import MapGrid
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import pack_real
 from arlight.probe.design import Probe

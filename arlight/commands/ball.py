@@ -10,11 +10,11 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from arlight.calibration.ball_capture import CapturedBall, CaptureSettings, capture_ball
-from arlight.calibration.ball_outline import BallError
-from arlight.calibration.environment_file import SUFFIXES, save_coefficients, save_environment
-from arlight.calibration.mirror_ball import BallLight, MapGrid, merge_views
-from arlight.calibration.photographs import Photograph, PhotographError, load_photographs
+from arlight.calibration.ball.ball_capture import CapturedBall, CaptureSettings, capture_ball
+from arlight.calibration.ball.ball_outline import BallError
+from arlight.calibration.ball.environment_file import SUFFIXES, save_coefficients, save_environment
+from arlight.calibration.ball.mirror_ball import BallLight, MapGrid, merge_views
+from arlight.calibration.ball.photographs import Photograph, PhotographError, load_photographs
 from arlight.camera import Camera, Pose
 from arlight.color import Transfer
 from arlight.commands.options import File, OptionalFile

@@ -11,14 +11,14 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn
 
-from arlight.calibration.camera_calibration import CameraCalibration, calibrate_views
-from arlight.calibration.camera_fit import CameraFit, Expectation
-from arlight.calibration.camera_response import CameraResponse, measure_response
-from arlight.calibration.charuco import BoardDetector, CharucoBoard, write_board
-from arlight.calibration.marker_points import MarkerPoints
-from arlight.calibration.picture_source import named_frames
-from arlight.calibration.sheet_pictures import TargetPicture, fit_sheet
-from arlight.calibration.view_selection import edge_sharpness
+from arlight.calibration.camera.camera_calibration import CameraCalibration, calibrate_views
+from arlight.calibration.camera.camera_fit import CameraFit, Expectation
+from arlight.calibration.camera.camera_response import CameraResponse, measure_response
+from arlight.calibration.camera.charuco import BoardDetector, CharucoBoard, write_board
+from arlight.calibration.camera.marker_points import MarkerPoints
+from arlight.calibration.camera.picture_source import named_frames
+from arlight.calibration.camera.sheet_pictures import TargetPicture, fit_sheet
+from arlight.calibration.camera.view_selection import edge_sharpness
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
 from arlight.commands.outputs import Output, abandon, prepare_outputs

@@ -12,10 +12,10 @@ from rich.progress import Progress
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from arlight.calibration.known_lighting import KnownLightingCalibration, calibrate_known
-from arlight.calibration.known_lighting_fixed import FixedResult, calibrate_fixed
-from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.view_measurement import SeenSheet, find_sheet, varied
+from arlight.calibration.known_lighting.calibration import KnownLightingCalibration, calibrate_known
+from arlight.calibration.known_lighting.fixed_matrix import FixedResult, calibrate_fixed
+from arlight.calibration.known_lighting.known_light import KnownLight
+from arlight.calibration.layers.view_measurement import SeenSheet, find_sheet, varied
 from arlight.camera import Camera
 from arlight.commands.footage import SheetAndCamera, sheet_and_camera
 from arlight.commands.options import OptionalFile

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from arlight.calibration.printer import read_wedge, tone_of_values
+from arlight.calibration.printer.wedge_reading import read_wedge, tone_of_values
 from arlight.commands.options import OptionalFile
 from arlight.commands.outputs import abandon, prepare_outputs
 from arlight.errors import ProbeError

@@ -7,8 +7,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from arlight.calibration.layer_parameters import NAMES, PARAMETERS
-from arlight.calibration.self_calibration import SelfCalibration
+from arlight.calibration.layers.layer_parameters import NAMES, PARAMETERS
+from arlight.calibration.layers.self_calibration import SelfCalibration
 from arlight.commands.footage import SheetAndCamera, sheet_and_camera
 from arlight.commands.options import OptionalFile, PositionalFile
 from arlight.commands.outputs import prepare_outputs

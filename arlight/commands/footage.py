@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.focal_length import estimate_camera
+from arlight.calibration.camera.focal_length import estimate_camera
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
 from arlight.commands.sheet_calibration import CalibrationOptions, calibration_of

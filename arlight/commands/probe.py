@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
-from arlight.calibration.predicted_error import Conditions, PredictedError, advice, predict_error
+from arlight.calibration.printer.predicted_error import Conditions, PredictedError, advice, predict_error
 from arlight.commands.options import OptionalFile
 from arlight.optics import Slab
 from arlight.probe.design import Design, Probe

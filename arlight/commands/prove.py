@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from arlight.benchmark.proof import GROUPS, ClipResult, Treatment, calibrated, judge, medians, uncorrected
-from arlight.calibration.self_calibration import SelfCalibration
+from arlight.calibration.layers.self_calibration import SelfCalibration
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
 from arlight.commands.self_calibration import self_calibrate_clip

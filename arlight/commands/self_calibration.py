@@ -7,8 +7,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 from threadpoolctl import threadpool_limits
 
-from arlight.calibration.self_calibration import SelfCalibration, self_calibrate
-from arlight.calibration.view_measurement import find_sheet
+from arlight.calibration.layers.self_calibration import SelfCalibration, self_calibrate
+from arlight.calibration.layers.view_measurement import find_sheet
 from arlight.camera import Camera
 from arlight.errors import CalibrationError
 from arlight.probe.design import Probe

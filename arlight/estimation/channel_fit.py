@@ -17,8 +17,6 @@ from arlight.tracking.block_means import BlockMeans
 
 Array = NDArray[np.float64]
 
-__all__ = ["ChannelFit", "Nuisance", "fit_channel"]
-
 _ITERATIONS = 4
 _GAIN_DOUBT = 0.01
 """Relative error of all that a sheet measures: of the paper's reflectance, the film's and the glass's transmittance."""

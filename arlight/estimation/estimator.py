@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.channel_fit import ChannelFit, Nuisance, fit_channel
+from arlight.estimation.channel_fit import ChannelFit, fit_channel
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.normal_equations import BlockSystem
+from arlight.estimation.nuisance import Nuisance
 from arlight.estimation.prior import color_spread, color_stddev, prior_stddev
 from arlight.estimation.reflection import field_amplitude, reflection_basis
 from arlight.estimation.resampling import resampling

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.errors import CalibrationError, OutputError
-from arlight.estimation.channel_fit import Nuisance
 from arlight.estimation.estimator import Estimate
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.nuisance import Nuisance
 from arlight.fourier import unpack_real
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks

@@ -43,7 +43,8 @@ class BlockResponse:
         self._slab = (assembly or Assembly()).slab(probe)
         self._film = _toeplitz(light.film)
         self._echo = light.echo
-        self._usual_light = uniform_light(self._slab, measured_frequencies(probe, assembly or Assembly()))
+        if light.echo is not None:
+            self._usual_light = uniform_light(self._slab, measured_frequencies(probe, assembly or Assembly()))
         # share of the light that the film's second crossing leaves on its way out
         self._passed_twice = np.einsum("bl,bl->b", light.film, np.conj(light.film)).real
         # (blocks, m, l, c): film harmonic m - l times radiosity harmonic l

@@ -5,8 +5,8 @@ import pytest
 
 from arlight.benchmark.ball_scene import Ball, SurroundingLight, with_ball
 from arlight.benchmark.matte_ball import harmonics, matte_ball_light
-from arlight.calibration.ball_outline import BallOutline
-from arlight.calibration.mirror_ball import BallPicture, MapGrid
+from arlight.calibration.ball.ball_outline import BallOutline
+from arlight.calibration.ball.mirror_ball import BallPicture, MapGrid
 from arlight.camera import Camera, Pose
 from arlight.environment import Environment
 

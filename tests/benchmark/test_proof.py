@@ -8,8 +8,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from arlight.benchmark.proof import GROUPS, Treatment, calibrated, judge, medians, uncorrected
-from arlight.calibration.self_calibration import self_calibrate
-from arlight.calibration.view_measurement import find_sheet
+from arlight.calibration.layers.self_calibration import self_calibrate
+from arlight.calibration.layers.view_measurement import find_sheet
 from arlight.camera import Camera
 from arlight.errors import VideoError
 from arlight.probe.assembly import Assembly, Print, Registration

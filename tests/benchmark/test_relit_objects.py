@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arlight.benchmark.relit_objects import MATERIALS, RelitObjects
-from arlight.calibration.mirror_ball import MapGrid
+from arlight.calibration.ball.mirror_ball import MapGrid
 
 GRID = MapGrid(32)
 

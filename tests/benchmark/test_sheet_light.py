@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arlight.benchmark.sheet_light import SheetLight
-from arlight.calibration.mirror_ball import MapGrid
+from arlight.calibration.ball.mirror_ball import MapGrid
 from arlight.environment import Environment
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import pack_real

@@ -6,10 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.self_calibration import SelfCalibration, self_calibrate
-from arlight.calibration.sheet_view import SheetView
-from arlight.calibration.view_measurement import SeenSheet, ViewMeter, find_sheet
+from arlight.calibration.known_lighting.known_light import KnownLight
+from arlight.calibration.layers.self_calibration import SelfCalibration, self_calibrate
+from arlight.calibration.layers.sheet_view import SheetView
+from arlight.calibration.layers.view_measurement import SeenSheet, ViewMeter, find_sheet
 from arlight.camera import Camera
 from arlight.errors import RenderingUnavailableError
 from arlight.estimation.resampling import measured_frequencies

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 from arlight.benchmark.probe_scene import MIRROR_REFLECTANCE, ProbeScene
-from arlight.calibration.ball_outline import BallError
-from arlight.calibration.photographs import PhotographError
+from arlight.calibration.ball.ball_outline import BallError
+from arlight.calibration.ball.photographs import PhotographError
 from arlight.commands.ball import BallOptions, run
 from arlight.environment import Environment
 from arlight.errors import ArlightError, CameraError, OutputError, ProbeError

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from arlight.calibration.charuco import CharucoBoard
+from arlight.calibration.camera.charuco import CharucoBoard
 from arlight.camera import Camera, Pose
 from arlight.commands.calibrate_camera import CalibrateCameraOptions, run
 from arlight.errors import ArlightError, CalibrationError, CameraError, OutputError, VideoError

@@ -14,9 +14,7 @@ SHEET = Assembly(
     paper=Print(Registration((0.1, 0.04), -0.3, 0.999), 0.1, -0.02, 0.04),
     glass_scale=1.02,
 )
-BLOCKS = BlockCorrections(
-    np.array([1.01, 0.98]), np.array([0.001, 0.0]), np.array([0.97, 1.02]), np.array([2.0, -1.5])
-)
+BLOCKS = BlockCorrections(np.array([1.01, 0.98]), np.array([0.001, 0.0]), np.array([0.97, 1.02]), np.array([2.0, -1.5]))
 
 
 def test_what_is_saved_is_read(tmp_path):

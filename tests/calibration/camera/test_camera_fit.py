@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arlight.calibration.camera_fit import NAMES, Expectation, TargetView, fit_camera
+from arlight.calibration.camera.camera_fit import NAMES, Expectation, TargetView, fit_camera
 
 SIZE = (640, 480)
 GRID = np.array([[x, y] for x in np.linspace(-60, 60, 6) for y in np.linspace(-45, 45, 5)])

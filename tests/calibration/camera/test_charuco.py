@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from arlight.calibration.camera_calibration import calibrate_views
-from arlight.calibration.camera_fit import TargetView
-from arlight.calibration.charuco import BoardDetector, CharucoBoard, write_board
-from arlight.calibration.sheet_pictures import TargetPicture
-from arlight.calibration.view_selection import edge_sharpness
+from arlight.calibration.camera.camera_calibration import calibrate_views
+from arlight.calibration.camera.camera_fit import TargetView
+from arlight.calibration.camera.charuco import BoardDetector, CharucoBoard, write_board
+from arlight.calibration.camera.sheet_pictures import TargetPicture
+from arlight.calibration.camera.view_selection import edge_sharpness
 from arlight.errors import CalibrationError, CameraError
 from arlight.video.frame import Frame
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arlight.calibration.exposure import ExposureMeter
-from arlight.calibration.paper_samples import PaperSampler, read_encoded
+from arlight.calibration.camera.exposure import ExposureMeter
+from arlight.calibration.camera.paper_samples import PaperSampler, read_encoded
 from arlight.camera import Camera
 from arlight.color import linear_from_encoded
 from arlight.radiometry import Radiometry

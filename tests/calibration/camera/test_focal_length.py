@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from arlight.calibration.focal_length import estimate_camera
+from arlight.calibration.camera.focal_length import estimate_camera
 from arlight.errors import CalibrationError
 from arlight.video.frame import Frame
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arlight.calibration.marker_points import MarkerPoints
+from arlight.calibration.camera.marker_points import MarkerPoints
 from arlight.camera import Camera, Pose
 from arlight.tracking.luma import luma_codes
 from arlight.video.frame import Frame

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arlight.calibration.camera_response import measure_response
-from arlight.calibration.paper_samples import PaperSamples
-from arlight.calibration.response_curve import fit_response, patches_of
-from arlight.calibration.sensor_noise import clipping_level, fit_noise
+from arlight.calibration.camera.camera_response import measure_response
+from arlight.calibration.camera.paper_samples import PaperSamples
+from arlight.calibration.camera.response_curve import fit_response, patches_of
+from arlight.calibration.camera.sensor_noise import clipping_level, fit_noise
 from arlight.color import encoded_from_linear
 from arlight.errors import CalibrationError
 from arlight.radiometry import Radiometry

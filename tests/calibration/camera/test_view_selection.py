@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from arlight.calibration.camera_fit import TargetView
-from arlight.calibration.view_selection import edge_sharpness, select_views
+from arlight.calibration.camera.camera_fit import TargetView
+from arlight.calibration.camera.view_selection import edge_sharpness, select_views
 
 SIZE = (640, 480)
 GRID = np.array([[x, y] for x in np.linspace(-60, 60, 4) for y in np.linspace(-45, 45, 4)])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from arlight.calibration.known_lighting_light import KnownLight
-from arlight.calibration.view_measurement import SeenSheet
+from arlight.calibration.known_lighting.known_light import KnownLight
+from arlight.calibration.layers.view_measurement import SeenSheet
 from arlight.camera import Camera, Pose
 from arlight.environment import Environment
 from arlight.errors import RenderingUnavailableError

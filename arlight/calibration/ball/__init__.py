@@ -1,0 +1,1 @@
+"""A mirrored ball: photographs of it become the light around the sheet."""

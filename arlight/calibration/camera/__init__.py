@@ -1,0 +1,1 @@
+"""The camera: intrinsics, response to light, exposure."""

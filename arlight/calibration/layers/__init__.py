@@ -1,0 +1,1 @@
+"""The assembled sheet without known light, from a moving camera."""
