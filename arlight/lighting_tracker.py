@@ -25,6 +25,8 @@ from arlight.tracking.tracker import PoseTracker
 from arlight.video.frame import Frame
 
 _DEFAULT_BLUR_PX = 0.6
+_LEVEL_DEVIATION = 0.005
+"""Relative deviation beyond which the white paper's level is worse than the light's own from frame to frame."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -160,7 +162,8 @@ class LightingTracker:
         """The light over time, relative to the frame's white paper: a change of exposure is no change of light."""
         if self._exposure is not None and pose.camera_from_probe is not None:
             seen = self._exposure.measure(frame, pose.camera_from_probe)
-            self._level = seen.level if seen.valid else self._level
+            if np.all(seen.variance < (_LEVEL_DEVIATION * seen.level) ** 2):
+                self._level = seen.level
         relative = None if raw is None else raw.scaled(1.0 / self._level)
         lighting = self._filter.update(relative, frame.time_s)
         return None if lighting is None else lighting.scaled(self._level)

@@ -12,13 +12,13 @@ from arlight.synthetic.settings import SynthesisSettings, default_camera
 @pytest.fixture(scope="module")
 def cells():
     footage = SynthesisSettings(path="still", camera=default_camera((320, 240)), frame_rate=Fraction(25))
-    settings = AccuracySettings(tilts_deg=(20.0, 50.0), widths_px=(140.0, 230.0), frames=12, footage=footage)
+    settings = AccuracySettings(tilts_deg=(20.0, 50.0), widths_px=(140.0, 230.0), frames=24, footage=footage)
     return list(accuracy_table(settings, design_probe(1)))
 
 
 def test_a_cell_for_every_tilt_and_width(cells):
     assert [(cell.tilt_deg, cell.width_px) for cell in cells] == [(20, 140), (20, 230), (50, 140), (50, 230)]
-    assert all(cell.filtered.frames == 12 for cell in cells)
+    assert all(cell.filtered.frames == 24 for cell in cells)
     assert all([error.order for error in cell.filtered.orders] == [0, 1] for cell in cells)
 
 

@@ -318,7 +318,7 @@ def test_a_killed_run_leaves_readable_files(long_clip, tmp_path):
 
 
 def test_a_damaged_clip_gives_what_it_holds_and_says_so(arlight, footage, long_clip, tmp_path):
-    clip = copy_with_sidecars(footage, tmp_path / "cut", "cut.mkv")
+    clip = copy_with_sidecars(footage, tmp_path / "cut", "cut.mp4")
     with VideoReader(long_clip) as reader, VideoWriter(clip, like=reader) as writer:
         for frame in reader:
             if frame.index == 40:
@@ -327,11 +327,12 @@ def test_a_damaged_clip_gives_what_it_holds_and_says_so(arlight, footage, long_c
     whole = clip.read_bytes()
     rng = np.random.default_rng(8)
     middle = len(whole) // 2
+    # the index stays whole: it is the pictures that are spoilt
     clip.write_bytes(whole[:middle] + rng.bytes(6000) + whole[middle + 6000 :])
     (tmp_path / "old.jsonl").write_text("old")
     done = arlight("run", clip, "--no-render", "--lighting", "old.jsonl")
     assert done.status == 1
-    assert "cut.mkv: " in done.errors
+    assert "cut.mp4: " in done.errors
     assert "damaged" in done.errors
     assert (tmp_path / "old.jsonl").read_text() == "old"
     assert 5 <= len(read_log(tmp_path / "old.partial.jsonl").records) < 40
