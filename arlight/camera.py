@@ -5,7 +5,7 @@ millimetres (x right, y down, z forward).
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -104,6 +104,13 @@ class Camera:
             flat, self.camera_matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria
         )
         return np.asarray(undistorted, float).reshape(-1, 2)
+
+    def with_more_vignetting(self, added: tuple[float, float, float]) -> "Camera":
+        """The camera with the radial gain that a calibration found on top of its own."""
+        if not any(added):
+            return self
+        own = self.vignetting or (0.0, 0.0, 0.0)
+        return replace(self, vignetting=(own[0] + added[0], own[1] + added[1], own[2] + added[2]))
 
     def gain(self, pixels: ArrayLike) -> Array:
         """Vignetting (n,) at pixels (n, 2): recorded over incident light, 1 at the principal point."""

@@ -97,8 +97,7 @@ def judge(clip: Path, probe: Probe, treatment: Treatment) -> ClipResult:
 
 def calibrated(name: str, found: SelfCalibration, camera: Camera) -> Treatment:
     """What self-calibration found, with its vignetting on top of the camera's."""
-    own = np.array(camera.vignetting or (0.0, 0.0, 0.0)) + found.vignetting
-    return Treatment(name, found.assembly, replace(camera, vignetting=(float(own[0]), float(own[1]), float(own[2]))))
+    return Treatment(name, found.assembly, camera.with_more_vignetting(found.vignetting))
 
 
 def uncorrected(whole: Treatment) -> Iterator[Treatment]:

@@ -1,7 +1,7 @@
 """A clip with the probe and the camera that belong to it, and what to say when the sheet was never seen."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -90,8 +90,9 @@ def open_footage(clip: Path, options: FootageOptions) -> Footage:
         calibration = calibration_of(clip, options, probe, camera)
         if calibration.note is not None:
             notes = (*notes, calibration.note)
+        camera = camera.with_more_vignetting(calibration.vignetting)
         return Footage(
-            reader, probe, _with_vignetting(camera, calibration.vignetting), probe_path, camera_path, calibration.path,
+            reader, probe, camera, probe_path, camera_path, calibration.path,
             calibration.assembly, calibration.fixed, notes,
         )  # fmt: skip
     except BaseException:
@@ -130,13 +131,6 @@ def _camera(reader: VideoReader, path: Path | None, probe: Probe) -> tuple[Camer
             "the camera.json of this footage (--camera FILE)"
         )
     return camera, ()
-
-
-def _with_vignetting(camera: Camera, more: tuple[float, float, float]) -> Camera:
-    if not any(more):
-        return camera
-    own = camera.vignetting or (0.0, 0.0, 0.0)
-    return replace(camera, vignetting=(own[0] + more[0], own[1] + more[1], own[2] + more[2]))
 
 
 def check_result(footage: Footage, statistics: RunStatistics) -> None:

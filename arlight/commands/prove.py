@@ -15,6 +15,7 @@ from arlight.benchmark.proof import GROUPS, ClipResult, Treatment, calibrated, j
 from arlight.calibration.layers.self_calibration import SelfCalibration
 from arlight.camera import Camera
 from arlight.commands.options import OptionalFile
+from arlight.commands.outputs import prepare_outputs
 from arlight.commands.self_calibration import self_calibrate_clip
 from arlight.errors import CalibrationError, VideoError
 from arlight.probe.assembly import Assembly
@@ -59,7 +60,10 @@ def run(options: ProveOptions) -> int:
     true = load_assembly(options.folder / "assembly.json", len(field_blocks(probe)))
     clips = [clip for path in options.paths for clip in sorted(options.folder.glob(f"{path}-*.mp4"))]
     if not clips:
-        raise VideoError(f"{options.folder}: no clips {options.paths[0]}-*.mp4; make them with `arlight trace`")
+        raise VideoError(
+            f"{options.folder}: no clips {' or '.join(options.paths)}-*.mp4; make them with `arlight trace`"
+        )
+    outputs = prepare_outputs({"--output": options.output}, [*clips, options.known])
     console = Console(soft_wrap=True, highlight=False, markup=False, width=_WIDTH)
     results: list[ClipResult] = []
     found: dict[str, SelfCalibration] = {}
@@ -70,27 +74,29 @@ def run(options: ProveOptions) -> int:
             console.print(f"left out: {error}")
             continue
         own = calibrated(_SELF, found[clip.stem], camera)
-        for treatment in [Treatment(_AS_DESIGNED, None, camera), own, *_known(options.known, probe, camera)]:
+        judged = judge(clip, probe, own)
+        results.append(judged)
+        for treatment in [Treatment(_AS_DESIGNED, None, camera), *_known(options.known, probe, camera)]:
             results.append(judge(clip, probe, treatment))
         if options.flaws and clip.stem.startswith(options.paths[0]):
             results.extend(judge(clip, probe, treatment) for treatment in uncorrected(own))
-        console.print(f"{clip}: {_summary(results[-1])}")
+        console.print(f"{clip}: {_summary(judged)}")
     if not results:
         raise VideoError(f"{options.folder}: none of its clips could be calibrated on; trace them again")
     console.print(_error_table(results))
     console.print(_sheet_table(found, true))
-    if options.output is not None:
+    for output in outputs.values():
         content = {"clips": [asdict(result) for result in results], "sheet": {k: v.values for k, v in found.items()}}
-        options.output.write_text(json.dumps(content, indent=1) + "\n")
+        output.growing.write_text(json.dumps(content, indent=1) + "\n")
+        console.print(f"{output.keep()}")
     return 0
 
 
 def _known(path: Path | None, probe: Probe, camera: Camera) -> list[Treatment]:
     if path is None:
         return []
-    own = np.array(camera.vignetting or (0.0, 0.0, 0.0)) + load_vignetting(path)
-    seen = Camera(camera.image_size, camera.camera_matrix, camera.distortion, (own[0], own[1], own[2]))
-    return [Treatment(_KNOWN, load_assembly(path, len(field_blocks(probe))), seen)]
+    sheet = load_assembly(path, len(field_blocks(probe)))
+    return [Treatment(_KNOWN, sheet, camera.with_more_vignetting(load_vignetting(path)))]
 
 
 def _summary(result: ClipResult) -> str:

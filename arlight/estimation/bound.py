@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.color import encoded_from_linear
-from arlight.estimation.response import BlockResponse, frequency_columns, optical_transfer
+from arlight.estimation.response import BlockResponse, optical_transfer
 from arlight.probe.design import Probe
 from arlight.tracking.block_means import BlockMeans
 
@@ -20,9 +20,8 @@ class CramerRaoBound:
     def __init__(self, probe: Probe) -> None:
         self._response = BlockResponse(probe)
         self._count = 2 * len(probe.frequencies) - 1
-        column = frequency_columns(probe)
-        self._places = np.stack([np.zeros_like(column), 2 * column - 1, 2 * column], axis=1)
-        self._known = np.where(column > 0, 3, 1)
+        self._places = self._response.places
+        self._known = np.where(self._places[:, 1] > 0, 3, 1)
 
     def stddev(self, means: BlockMeans, pixel_variance: Array, blur_variance_px2: float) -> Array:
         """Least standard deviation of each coefficient's error.

@@ -53,7 +53,6 @@ class BlockResponse:
         self._paths *= known[:, None, None, :]
         # the lower face mirrors through the film twice, 2 D(v) apart: film harmonics m - l and l, turned by 2 l b
         self._mirror = self._film * light.film[:, None]
-        self._clear = float(probe.film_transmittance)
 
     def light(self, means: BlockMeans, shape: Array | None = None) -> Array:
         """Rows (blocks, 7, c) for unit coefficients before blur.
@@ -91,12 +90,6 @@ class BlockResponse:
         series = np.einsum("bml,bl->bm", self._mirror, turn)
         passed = (1.0 - self._slab.interface_reflectance(means.view_cosine)) ** 2
         return _real_rows(series[..., None])[..., 0] * passed[:, None]
-
-
-def frequency_columns(probe: Probe) -> NDArray[np.int64]:
-    """(blocks,) place of each block's frequency among the probe's frequencies; 0 for blocks without pattern."""
-    place = {(int(u), int(v)): k for k, (u, v) in enumerate(probe.frequencies)}
-    return np.array([place[block.frequency] if block.frequency else 0 for block in field_blocks(probe)])
 
 
 def _places(probe: Probe, blocks: tuple[Block, ...], columns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -93,7 +93,7 @@ class KnownLightingCalibration:
 
     def camera(self, camera: Camera) -> Camera:
         """The camera with the vignetting that was found, on top of its own."""
-        return _with_vignetting(camera, self.vignetting)
+        return camera.with_more_vignetting(self.vignetting)
 
 
 def calibrate_known(
@@ -158,7 +158,7 @@ def calibrate_known(
         change, _ = normal.solve(without=number)
         without = fit.moved(unknowns, change)
         frames = [frame for frame in chosen if frame.light == number]
-        lens = _with_vignetting(camera, (*without.vignetting, 0.0))
+        lens = camera.with_more_vignetting((*without.vignetting, 0.0))
         errors.append(lighting_error(light, frames, probe, lens, without, unknowns.exposures[number]))
         progress(done := done + 1, total)
     check_match(errors, lights, probe, relative)
@@ -264,8 +264,3 @@ def _white(probe: Probe) -> NDArray[np.bool_]:
 
 def _orders(probe: Probe) -> NDArray[np.int64]:
     return frequency_order(np.array([block.frequency or (0, 0) for block in field_blocks(probe)]))
-
-
-def _with_vignetting(camera: Camera, added: tuple[float, float, float]) -> Camera:
-    k1, k2, k3 = np.array(camera.vignetting or (0.0, 0.0, 0.0)) + added
-    return replace(camera, vignetting=(float(k1), float(k2), float(k3)))
