@@ -1,10 +1,14 @@
 import base64
 import re
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from arlight.camera import Pose
 
 
 @dataclass(frozen=True)
@@ -46,3 +50,18 @@ def _parse(path: Path) -> Pdf:
 @pytest.fixture(scope="session")
 def read_pdf():
     return _parse
+
+
+@pytest.fixture(scope="session")
+def look() -> Callable[..., Pose]:
+    """The pose of a camera that looks at a point off_mm beside the middle, from a direction and a distance."""
+
+    def pose(tilt_deg: float, azimuth_deg: float, distance_mm: float, roll_deg: float = 0.0, off_mm=(0.0, 0.0)) -> Pose:
+        tilt, azimuth, roll = np.radians([tilt_deg, azimuth_deg, roll_deg])
+        up = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
+        right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+        level = np.stack([right, np.cross(-up, right), -up])
+        turned = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]]) @ level
+        return Pose(turned, np.array([0.0, 0.0, distance_mm]) - turned @ np.array([*off_mm, 0.0]))
+
+    return pose

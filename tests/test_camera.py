@@ -172,3 +172,15 @@ def test_impossible_vignetting_is_refused(tmp_path, vignetting):
     path.write_text(json.dumps(content))
     with pytest.raises(CameraError, match=r"camera\.json"):
         Camera.load(path)
+
+
+def test_vignetting_is_added_to_the_cameras_own():
+    plain = Camera((64, 48), [[60.0, 0, 31.5], [0, 60, 23.5], [0, 0, 1]], np.zeros(5))
+    assert plain.with_more_vignetting((0.0, 0.0, 0.0)) is plain
+    once = plain.with_more_vignetting((-0.1, 0.02, 0.0))
+    twice = once.with_more_vignetting((-0.05, 0.0, 0.01))
+    np.testing.assert_allclose(twice.vignetting, (-0.15, 0.02, 0.01))
+    pixels = np.array([[0.0, 0.0], [50.0, 10.0]])
+    np.testing.assert_allclose(
+        twice.gain(pixels) - once.gain(pixels), plain.with_more_vignetting((-0.05, 0, 0.01)).gain(pixels) - 1
+    )

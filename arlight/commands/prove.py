@@ -60,9 +60,8 @@ def run(options: ProveOptions) -> int:
     true = load_assembly(options.folder / "assembly.json", len(field_blocks(probe)))
     clips = [clip for path in options.paths for clip in sorted(options.folder.glob(f"{path}-*.mp4"))]
     if not clips:
-        raise VideoError(
-            f"{options.folder}: no clips {' or '.join(options.paths)}-*.mp4; make them with `arlight trace`"
-        )
+        names = " or ".join(f"{path}-*.mp4" for path in options.paths)
+        raise VideoError(f"{options.folder}: no clips {names}; make them with `arlight trace`")
     outputs = prepare_outputs({"--output": options.output}, [*clips, options.known])
     console = Console(soft_wrap=True, highlight=False, markup=False, width=_WIDTH)
     results: list[ClipResult] = []
