@@ -38,3 +38,7 @@ class OutputError(ArlightError):
 
 class RenderingUnavailableError(ArlightError):
     """No headless OpenGL on this machine; estimation still works."""
+
+
+class InstallationError(ArlightError):
+    """A part of the program itself is missing."""
