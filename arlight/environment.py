@@ -9,7 +9,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.errors import EnvironmentMapError
@@ -149,7 +148,9 @@ def _decode_hdr(path: Path) -> NDArray[np.float32]:
 
 
 def _decode_exr(path: Path) -> NDArray[np.float32]:
-    # not by OpenCV: its packages are built without OpenEXR
+    # not by OpenCV: its packages are built without OpenEXR; here, because most environments are .hdr files
+    import OpenEXR
+
     try:
         channels = OpenEXR.File(str(path), separate_channels=True).channels()
     except (RuntimeError, ValueError) as error:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from arlight.errors import CameraError
+from arlight.monotone import interpolate_monotone
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Radiometry:
         Negative light is kept: noise around black averages to no light at all.
         """
         knots = np.linspace(0.0, 1.0, len(self.response))
-        signal = PchipInterpolator(knots, self.response)(np.clip(np.asarray(encoded, float), 0.0, 1.0))
+        signal = interpolate_monotone(np.clip(np.asarray(encoded, float), 0.0, 1.0), knots, self.response)
         return np.asarray((signal - self.black) / (1.0 - self.black), float)
 
     def table(self, size: int) -> NDArray[np.float32]:

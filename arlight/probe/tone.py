@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import isotonic_regression
 
 from arlight.errors import ProbeError
+from arlight.monotone import interpolate_monotone
 from arlight.probe.assembly import Print
 
 Array = NDArray[np.float64]
@@ -59,6 +58,9 @@ class ToneCurve:
             ProbeError: too few steps, one end missing, a step that is no number, contrast too low, or steps that fall
                 by more than measurement noise.
         """
+        # here, because only a measured wedge needs it and it takes long to load
+        from scipy.optimize import isotonic_regression
+
         shares, where = np.unique(np.round(np.asarray(asked, float), 6), return_inverse=True)
         values = np.asarray(measured, float)
         _check_steps(np.asarray(asked, float), shares, values)
@@ -85,7 +87,7 @@ class ToneCurve:
 
     def print_of(self, asked: ArrayLike) -> Array:
         """What shares of unprinted dots in [0, 1] print as."""
-        return np.asarray(PchipInterpolator(self.asked, self.printed)(np.clip(asked, 0.0, 1.0)), float)
+        return interpolate_monotone(np.clip(asked, 0.0, 1.0), self.asked, self.printed)
 
     def share_for(self, value: ArrayLike) -> Array:
         """The share of unprinted dots that prints as a value; values beyond the curve's ends give its ends."""

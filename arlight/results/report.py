@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from arlight.color import encoded_from_linear
 from arlight.errors import OutputError
 from arlight.fourier import synthesise
-from arlight.results.charts import coefficient_chart
 from arlight.results.record import LogHeader, LogRecord
 from arlight.results.statistics import RunStatistics
 from arlight.video.frame import Frame
@@ -87,6 +86,9 @@ def report_page(
     header: LogHeader, records: Sequence[LogRecord], thumbnails: Sequence[Thumbnail], statistics: RunStatistics
 ) -> str:
     """The page as HTML."""
+    # here, because only a finished report needs matplotlib, which takes long to load
+    from arlight.results.charts import coefficient_chart
+
     rows = "".join(f"<tr><td>{escape(k)}</td><td>{escape(v)}</td></tr>" for k, v in _facts(header, statistics))
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Light in {escape(Path(header.source).name)}</title>
