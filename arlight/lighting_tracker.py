@@ -1,5 +1,6 @@
 """Frames in, pose and lighting out: the estimation half of the frame loop, without rendering."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
@@ -61,7 +62,7 @@ class FrameEstimate:
     raw: Lighting | None
     """This frame's own estimate; None when the sheet was not seen."""
     timings_s: dict[str, float] = field(default_factory=dict)
-    """Wall time of each stage [s]."""
+    """Time of each stage by the tracker's clock, wall time by default [s]."""
     unexplained: float = float("nan")
     """Share of the stripes in this frame that the probe does not explain under any light, 0 to about 1; nan where no
     stripes are resolved."""
@@ -83,6 +84,7 @@ class LightingTracker:
         settings: choices that trade speed for accuracy.
         assembly: what calibration found the printed sheet to be; exactly as designed by default.
         estimator: what makes lighting of the blocks; the model of the assembled sheet by default.
+        clock: what times the stages [s].
 
     Raises:
         ProbeError: the sheet's fiducials are unknown to ArUco, or it does not measure the order that is asked for.
@@ -95,8 +97,10 @@ class LightingTracker:
         settings: TrackerSettings | None = None,
         assembly: Assembly | None = None,
         estimator: BlockEstimator | None = None,
+        clock: Callable[[], float] = perf_counter,
     ) -> None:
         self._settings = settings or TrackerSettings()
+        self._clock = clock
         if self._settings.order is not None:
             orders_up_to(probe.frequencies, self._settings.order)
         self._radiometry = camera.radiometry
@@ -125,19 +129,19 @@ class LightingTracker:
             return self._update(frame)
 
     def _update(self, frame: Frame) -> FrameEstimate:
-        start = perf_counter()
+        start = self._clock()
         codes, table = luma_codes(frame, self._radiometry)
         pose = self._tracker.update(codes, frame.time_s, table)
-        tracked = perf_counter()
+        tracked = self._clock()
         estimate, measured = self._estimate(frame, pose)
         raw = None if estimate is None else self._cut(estimate.lighting)
-        estimated = perf_counter()
+        estimated = self._clock()
         lighting = self._filtered(raw, frame, pose) if self._settings.filtered else raw
         timings = {
             "track": tracked - start,
             "measure": measured - tracked,
             "estimate": estimated - measured,
-            "filter": perf_counter() - estimated,
+            "filter": self._clock() - estimated,
         }
         if pose.camera_from_probe is None and lighting is not None:
             pose = ProbePose(None, float("nan"), "coasting")
@@ -147,13 +151,13 @@ class LightingTracker:
     def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Estimate | None, float]:
         """The frame's own estimate, and when its blocks had been measured."""
         if pose.camera_from_probe is None:
-            return None, perf_counter()
+            return None, self._clock()
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
         last, measured = self._last, 0.0
         for _ in range(1 if last else _FIRST_PASSES):
             stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
             means = self._meter.measure(frame, pose.camera_from_probe, blur_px, stripes)
-            measured = perf_counter()
+            measured = self._clock()
             last = self._estimator.estimate(means, frame.time_s, nuisance)
         self._last = last
         return last, measured
