@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union
 import tyro
 from rich.console import Console
 
+from arlight.commands.dispatch import run_command
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.errors import ArlightError
 
@@ -24,7 +25,7 @@ COMMANDS = {
     "trace": "TraceOptions",
     "prove": "ProveOptions",
 }
-"""Module below `arlight.commands` and class of options of every subcommand."""
+"""Module of `arlight.commands` and `arlight.commands.options`, and class of options of every subcommand."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -32,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
     try:
         options = _parsed(sys.argv[1:] if arguments is None else arguments)
-        return int(import_module(type(options).__module__).run(options))
+        return run_command(options)
     except ArlightError as error:
         errors.print(f"arlight: {error}")
         return 1
@@ -61,7 +62,7 @@ def _listed(name: str) -> Any:
 
 
 def _options(name: str) -> Any:
-    return getattr(import_module(f"arlight.commands.{name}"), COMMANDS[name])
+    return getattr(import_module(f"arlight.commands.options.{name}"), COMMANDS[name])
 
 
 if __name__ == "__main__":

@@ -1,13 +1,11 @@
 """`arlight calibrate camera`: intrinsics from pictures of a printed board or of the sheet, and response to light."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn
 
@@ -20,7 +18,7 @@ from arlight.calibration.camera.picture_source import named_frames
 from arlight.calibration.camera.sheet_pictures import TargetPicture, fit_sheet
 from arlight.calibration.camera.view_selection import edge_sharpness
 from arlight.camera import Camera
-from arlight.commands.options import OptionalFile
+from arlight.commands.options.calibrate_camera import CalibrateCameraOptions
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.errors import ArlightError, CalibrationError, OutputError
 from arlight.probe.design import Probe
@@ -30,37 +28,6 @@ from arlight.tracking.luma import luma_codes
 from arlight.video.frame import Frame
 
 _LOW_COVERAGE = 0.5
-
-
-@dataclass(frozen=True)
-class CalibrateCameraOptions:
-    """Measure a camera: focal length, principal point, lens distortion; with --response its response to light too.
-
-    1. Print the board: `arlight calibrate camera --board board.pdf`, or use the sheet itself (--probe).
-    2. Film it, or take a dozen pictures, from different directions and distances, with zoom and focus locked.
-    3. `arlight calibrate camera clip.mp4 --output camera.json`.
-    """
-
-    pictures: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FILE ...")] = ()
-    """Videos and pictures of the board or the sheet, all of one size."""
-    output: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("camera.json")
-    """Camera file to write."""
-    board: OptionalFile = None
-    """Write the board as a PDF to print at 100 %, and end."""
-    paper: Paper = "a4"
-    """Page that the board is printed on, in landscape."""
-    columns: int = 10
-    """Squares across of the board."""
-    rows: int = 7
-    """Squares down of the board; odd."""
-    square_mm: float = 25.0
-    """Side of a square [mm]; does not change the intrinsics."""
-    probe: OptionalFile = None
-    """probe.json of the sheet, where the pictures show the sheet instead of the board."""
-    response: bool = False
-    """Measure response curve, black and clipping level and noise, from the grey wedge on the sheet's frame."""
-    camera: OptionalFile = None
-    """Camera file whose intrinsics are kept; with --response, which is then all that is measured."""
 
 
 def run(options: CalibrateCameraOptions) -> int:

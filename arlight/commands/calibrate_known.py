@@ -1,12 +1,9 @@
 """`arlight calibrate known`: the assembled sheet from frames under known lighting."""
 
-from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-import tyro
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -17,8 +14,8 @@ from arlight.calibration.known_lighting.fixed_matrix import FixedResult, calibra
 from arlight.calibration.known_lighting.known_light import KnownLight
 from arlight.calibration.layers.view_measurement import SeenSheet, find_sheet, varied
 from arlight.camera import Camera
-from arlight.commands.footage import SheetAndCamera, sheet_and_camera
-from arlight.commands.options import OptionalFile
+from arlight.commands.footage import sheet_and_camera
+from arlight.commands.options.calibrate_known import CalibrateKnownOptions
 from arlight.commands.outputs import Output, prepare_outputs
 from arlight.environment import Environment
 from arlight.errors import ArlightError, CalibrationError, CameraError
@@ -30,36 +27,6 @@ from arlight.video.reader import VideoReader
 
 _SEARCHED = 60
 """Frames of a clip that are looked at, spread over it."""
-
-
-@dataclass(frozen=True)
-class CalibrateKnownOptions:
-    """Find out what a printed sheet became, from clips or pictures of it under lights that are known.
-
-    Each of --frames was lit by the environment in the same place of --environments, given in the sheet's frame: row 0
-    its zenith, azimuth from the sheet's x axis toward its y axis, turned by --yaws. Writes the layers and each block's
-    corrections for `arlight run --calibration`.
-    """
-
-    frames: tuple[Path, ...]
-    """Clips or pictures of the sheet, each under one light; from several sides for a camera that will move."""
-    environments: tuple[Path, ...]
-    """The .hdr or .exr of each, as `arlight ball` makes them."""
-    yaws: tuple[float, ...] = ()
-    """Turn of each environment about the sheet's normal, counterclockwise from above [deg]; none by default."""
-    exposures: tuple[float, ...] = ()
-    """Factor on each environment's radiance that makes 1 the camera's full scale; 1 by default."""
-    relative: bool = False
-    """Leave each light's brightness open, in each channel; then the sheet's own reflectance is taken as stated."""
-    estimator: Literal["layers", "fixed"] = "layers"
-    """layers: for every viewpoint; fixed: the paper's L = MV, for the one viewpoint of all frames."""
-    output: OptionalFile = None
-    """The calibration; sheet.calibration.json, or sheet.fixed.npz, by default."""
-    calibration: OptionalFile = None
-    """A calibration to start from, such as `arlight calibrate self` gives."""
-    views: int = 6
-    """Frames that are used of each clip, as different in direction as they come."""
-    footage: tyro.conf.OmitArgPrefixes[SheetAndCamera] = field(default_factory=SheetAndCamera)
 
 
 def run(options: CalibrateKnownOptions) -> int:

@@ -1,43 +1,17 @@
 """`arlight calibrate printer`: a printer's profile from its printed wedge."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from rich.console import Console
 
 from arlight.calibration.printer.wedge_reading import read_wedge, tone_of_values
-from arlight.commands.options import OptionalFile
+from arlight.commands.options.calibrate_printer import CalibratePrinterOptions
 from arlight.commands.outputs import abandon, prepare_outputs
 from arlight.errors import ProbeError
-from arlight.probe.printer_profile import Dpi, PrinterProfile, load_profile, save_profile
+from arlight.probe.printer_profile import PrinterProfile, load_profile, save_profile
+from arlight.probe.resolution import Dpi
 from arlight.probe.tone import ToneCurve
-
-
-@dataclass(frozen=True)
-class CalibratePrinterOptions:
-    """Measure how a printer prints tones, from the wedge that `arlight probe --wedge` writes.
-
-    Print it on the sheet's paper, and on the transparency. Photograph or scan the paper straight from above in even
-    light; hold the transparency before an evenly bright white, such as a window with a sheet of paper behind it, and
-    photograph that. Switch the scanner's and the camera's corrections off. Or type in what a densitometer reads.
-    """
-
-    photo: Annotated[tyro.conf.Positional[Path | None], tyro.conf.arg(metavar="PHOTO")] = None
-    """Photograph or scan of the wedge on paper."""
-    film_photo: OptionalFile = None
-    """Photograph of the wedge on transparency."""
-    values: tuple[float, ...] = ()
-    """Reflectances of the 28 patches in the order of their numbers, on any linear scale, instead of a photograph."""
-    film_values: tuple[float, ...] = ()
-    """Transmittances of the 28 patches of the transparency, instead of a photograph."""
-    dpi: Dpi | None = None
-    """Resolution that the wedge was printed with; photographs show it, typed values do not."""
-    update: OptionalFile = None
-    """Profile to take the medium from that is not measured now."""
-    output: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("printer.json")
-    """Profile to write, for `arlight probe --printer-profile`."""
 
 
 def run(options: CalibratePrinterOptions) -> int:

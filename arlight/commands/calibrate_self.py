@@ -1,38 +1,18 @@
 """`arlight calibrate self`: the assembled sheet from a clip of it, without known light."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import tyro
 from rich.console import Console
 from rich.table import Table
 
 from arlight.calibration.layers.layer_parameters import NAMES, PARAMETERS
 from arlight.calibration.layers.self_calibration import SelfCalibration
-from arlight.commands.footage import SheetAndCamera, sheet_and_camera
-from arlight.commands.options import OptionalFile, PositionalFile
+from arlight.commands.footage import sheet_and_camera
+from arlight.commands.options.calibrate_self import CalibrateSelfOptions
 from arlight.commands.outputs import prepare_outputs
-from arlight.commands.self_calibration import FIRST_SECONDS, self_calibrate_clip
+from arlight.commands.self_calibration import self_calibrate_clip
 from arlight.errors import ArlightError, CalibrationError
 from arlight.probe.assembly_storage import save_assembly
-
-
-@dataclass(frozen=True)
-class CalibrateSelfOptions:
-    """Find how the sheet was printed and put together, from a camera that moves over it for a few seconds.
-
-    The light may be any, as long as it stays as it is; the camera should see the whole sheet, sharp, from sides that
-    differ by 30 degrees or more. The result is found by `arlight run` by itself when it lies beside a clip as
-    CLIP.calibration.json or calibration.json.
-    """
-
-    clip: PositionalFile
-    """The video of the sheet."""
-    output: OptionalFile = None
-    """The calibration; CLIP.calibration.json in the current folder by default."""
-    seconds: float = FIRST_SECONDS
-    """How much of the clip to look at [s]."""
-    footage: tyro.conf.OmitArgPrefixes[SheetAndCamera] = field(default_factory=SheetAndCamera)
 
 
 def run(options: CalibrateSelfOptions) -> int:

@@ -1,18 +1,13 @@
 """`arlight demo`: frames synthesised on the fly, tracked, relit and written, without any file to start from."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
 
-import tyro
-
-from arlight.commands.encoding import EncodingOptions
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.commands.loop import Sinks, Work, run_frames
-from arlight.commands.options import File, OptionalFile
+from arlight.commands.options.demo import DemoOptions
 from arlight.commands.outputs import Output, abandon, prepare_outputs
-from arlight.commands.relighting import RelightingOptions, make_relighter
+from arlight.commands.relighting import make_relighter
 from arlight.commands.summary import print_summary
 from arlight.errors import ArlightError
 from arlight.pipeline import Pipeline
@@ -22,36 +17,10 @@ from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.statistics import RunStatistics
 from arlight.synthetic.captured import load_environment
-from arlight.synthetic.motion import PathName
 from arlight.synthetic.settings import SynthesisSettings
 from arlight.synthetic.synthesis import synthesize
 from arlight.video.frame import Frame
 from arlight.video.writer import VideoWriter, check_output
-
-
-@dataclass(frozen=True)
-class DemoOptions:
-    """Show the whole loop without a camera: film a sheet that is not there, track it, light an object with its light.
-
-    Frames are synthesised one at a time, as a camera would give them.
-    """
-
-    output: File = Path("demo.mp4")
-    """The relit video."""
-    lighting: OptionalFile = None
-    """Pose and lighting, one JSON line a frame."""
-    seconds: float = 6.0
-    """Length of the video [s]."""
-    environment: Annotated[str, tyro.conf.arg(metavar="NAME|FILE")] = "hall"
-    """Captured light: the name of one that comes with arlight, or a latitude-longitude .hdr or .exr file."""
-    light: Literal["still", "turn"] = "turn"
-    """The light stands still, or turns about the zenith."""
-    path: PathName = "orbit"
-    """How the camera moves."""
-    order: int = 5
-    """Order of the sheet, 1 to 8."""
-    relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
-    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
 
 
 def run(options: DemoOptions) -> int:

@@ -2,12 +2,9 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import Progress
@@ -19,7 +16,7 @@ from arlight.benchmark.figures import FigureError, LightFigure, measure_figures
 from arlight.benchmark.figures_page import draw_figures
 from arlight.benchmark.probe_scene import ProbeScene, turned
 from arlight.benchmark.relit_objects import MATERIALS
-from arlight.commands.options import File, OptionalFile
+from arlight.commands.options.figures import FiguresOptions
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.environment import Environment
 from arlight.errors import ArlightError, OutputError
@@ -31,32 +28,6 @@ _SUFFIXES = (".png", ".pdf", ".svg")
 _FIGURE_LIGHTS = ("hall", "bridge")
 _DPI = 150
 _TABLE_WIDTH = 125
-
-
-@dataclass(frozen=True)
-class FiguresOptions:
-    """Draw the paper's figures 6, 7 and 8: light measured with the sheet beside light measured with a mirrored ball.
-
-    Sheet and ball are photographed together under captured light: once for the sheet, as a bracket for the ball. With
-    --compare instead: sheet, mirrored ball and matte ball, one 8-bit picture each, and how well each relights objects.
-    """
-
-    output: File = Path("figures.png")
-    """The page, .png, .pdf or .svg."""
-    json: OptionalFile = None
-    """The numbers, as JSON."""
-    compare: bool = False
-    """Compare sheet, mirrored ball and matte ball instead."""
-    environments: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE...")] = ()
-    """Captured lights: hall and bridge by default, all that come with arlight for --compare."""
-    turns: int = 3
-    """How often each light of --compare is turned about the zenith."""
-    order: int = 5
-    """Order of the sheet, 1 to 8."""
-    size: tuple[int, int] = (1280, 720)
-    """Width and height of the pictures [px]."""
-    seed: int = 0
-    """Chooses the sensor's noise."""
 
 
 def run(options: FiguresOptions) -> int:

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.camera.focal_length import estimate_camera
 from arlight.camera import Camera
-from arlight.commands.options import OptionalFile
-from arlight.commands.sheet_calibration import CalibrationOptions, calibration_of
+from arlight.commands.options.footage import FootageOptions, SheetAndCamera
+from arlight.commands.sheet_calibration import calibration_of
 from arlight.errors import ArlightError, CalibrationError, CameraError, ProbeError, VideoError
 from arlight.estimation.fixed_estimator import FixedEstimator
 from arlight.probe.assembly import Assembly
@@ -26,21 +25,6 @@ _SEARCHED = 8
 # the probe's own sheet leaves 0.01 to 0.1 of the stripes, 0.25 when the video is compressed until they are torn; other
 # phases, patterns or glass leave 0.45 or more
 _UNEXPLAINED_LIMIT = 0.35
-
-
-@dataclass(frozen=True)
-class SheetAndCamera:
-    """What was filmed, and with what; found beside the clip where it is not given."""
-
-    probe: OptionalFile = None
-    """probe.json of the sheet that was filmed."""
-    camera: OptionalFile = None
-    """camera.json of the camera that filmed it; without one the focal length is estimated from the clip."""
-
-
-@dataclass(frozen=True)
-class FootageOptions(CalibrationOptions, SheetAndCamera):
-    """What was filmed, with what, and how the sheet turned out; found beside the clip where it is not given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +103,9 @@ def _paths(clip: Path, options: SheetAndCamera) -> tuple[Path, Path | None]:
 def _camera(reader: VideoReader, path: Path | None, probe: Probe) -> tuple[Camera, tuple[str, ...]]:
     """The camera that filmed a clip, estimated where there is no file of it, and what to tell about it."""
     if path is None:
+        # here, because few clips lack their camera and its calibration takes long to load
+        from arlight.calibration.camera.focal_length import estimate_camera
+
         try:
             estimate = estimate_camera(reader, probe)
         except CalibrationError as error:

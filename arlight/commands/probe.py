@@ -1,65 +1,28 @@
 """`arlight probe`: design a sheet and write what is needed to print and use it, or a tone wedge for a printer."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from rich.console import Console
 
 from arlight.calibration.printer.predicted_error import Conditions, PredictedError, advice, predict_error
-from arlight.commands.options import OptionalFile
+from arlight.commands.options.probe import RASTER_PER_MM, ProbeOptions
 from arlight.optics import Slab
-from arlight.probe.design import Design, Probe
+from arlight.probe.design import Probe
 from arlight.probe.halftone import MM_PER_INCH, Halftones, Tones, render_halftones, require_dots
 from arlight.probe.layout import design_probe
 from arlight.probe.output import write_probe
-from arlight.probe.pages import Paper
-from arlight.probe.printer_profile import Dpi, PrinterProfile, load_profile
+from arlight.probe.printer_profile import PrinterProfile, load_profile
+from arlight.probe.resolution import Dpi
 from arlight.probe.wedge import write_wedge_folder
 
 ACCEPTABLE_ERROR = 0.03
 """Predicted error relative to |L~_0| from which the command warns."""
 
-_RASTER_PER_MM = 20.0
 _UNMEASURED_DOT_GAIN = 0.1
 """What printers' dots grow by at half coverage where no profile says so."""
 _DEFAULT_DPI: Dpi = 600
-
-
-@dataclass(frozen=True)
-class ProbeOptions:
-    """Design a sheet and write what is needed to print and use it.
-
-    The folder gets probe.json (which `arlight run` needs), top.pdf, bottom.pdf and frame.pdf to print at 100 %,
-    guide.pdf on how to put them together, the same layers as PNG rasters, and preview.png.
-    """
-
-    output: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("probe")
-    """Folder to write to; made if it does not exist."""
-    order: int = 5
-    """Detail of the light that the sheet measures, 1 to 8; a higher order needs a larger sheet."""
-    design: Design = "matched"
-    """matched: four phases, works from every viewpoint; doubled: the two phases of the original paper."""
-    glass_mm: float = 2.44
-    """Thickness of the glass between film and paper [mm]; measure yours."""
-    refractive_index: float = 1.52
-    """Refractive index of the glass: 1.52 window glass, 1.49 acrylic."""
-    paper: Paper = "a4"
-    """Page to print on."""
-    dpi: Dpi | None = None
-    """Print dots of this resolution, right in what the sheet measures, and state the error to expect; grey levels for
-    the printer to screen by default."""
-    printer_profile: OptionalFile = None
-    """What `arlight calibrate printer` measured: dot gain is compensated. Gives --dpi."""
-    wedge: bool = False
-    """Write wedge.pdf alone: tones to print, photograph and give to `arlight calibrate printer`. With
-    --printer-profile they are compensated, to check the profile."""
-    pixels_per_mm: float = _RASTER_PER_MM
-    """Resolution of the rasters; with --dpi it follows from that."""
-    mirror_film: bool = True
-    """Print the film mirrored, so that its ink faces the glass."""
 
 
 def run(options: ProbeOptions) -> int:
@@ -111,7 +74,7 @@ def _design(options: ProbeOptions, dpi: Dpi | None) -> Probe:
 
 
 def _dots_per_pixel(dpi: Dpi) -> int:
-    return max(1, int(dpi / MM_PER_INCH / _RASTER_PER_MM))
+    return max(1, int(dpi / MM_PER_INCH / RASTER_PER_MM))
 
 
 def _printed(probe: Probe, dpi: Dpi, tones: Tones) -> tuple[Halftones, PredictedError]:

@@ -2,19 +2,17 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from rich.console import Console
 from rich.table import Table
 
 from arlight.benchmark.proof import GROUPS, ClipResult, Treatment, calibrated, judge, medians, uncorrected
 from arlight.calibration.layers.self_calibration import SelfCalibration
 from arlight.camera import Camera
-from arlight.commands.options import OptionalFile
+from arlight.commands.options.prove import ProveOptions
 from arlight.commands.outputs import prepare_outputs
 from arlight.commands.self_calibration import self_calibrate_clip
 from arlight.errors import CalibrationError, VideoError
@@ -27,27 +25,6 @@ from arlight.tracking.block_layout import field_blocks
 _WIDTH = 140
 """Of the tables, in characters: their rows are not to be wrapped."""
 _AS_DESIGNED, _SELF, _KNOWN = "as designed", "self-calibrated", "known light"
-
-
-@dataclass(frozen=True)
-class ProveOptions:
-    """Judge self-calibration, and a calibration from known light, on the clips that `arlight trace` made.
-
-    Every clip NAME-LIGHT.mp4 of a moving camera is self-calibrated and followed; printed are the median errors over
-    frames and clips, how honest the error bars are, how well the sheet itself was found, and what each of its flaws
-    costs when it is left uncorrected. Takes about a minute a clip.
-    """
-
-    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """The traced clips, with probe.json, camera.json and assembly.json."""
-    known: OptionalFile = None
-    """Calibration from known light, of `arlight calibrate known` on the folder's known-LIGHT clips."""
-    paths: tuple[str, ...] = ("orbit", "dive", "hand")
-    """Camera paths to judge: clips whose names begin so."""
-    flaws: bool = True
-    """Also leave each flaw uncorrected in turn, on the first path."""
-    output: OptionalFile = None
-    """All figures as JSON."""
 
 
 def run(options: ProveOptions) -> int:

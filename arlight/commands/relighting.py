@@ -1,27 +1,17 @@
 """The object that is drawn, where it stands and what draws it."""
 
-from dataclasses import dataclass, field
+from pathlib import Path
 
-import tyro
 from rich.console import Console
 from rich.progress import Progress
 
 from arlight.camera import Camera
-from arlight.commands.options import OptionalFile
+from arlight.commands.options.relighting import RelightingOptions
 from arlight.pipeline import FrameRelighter
 from arlight.probe.design import Probe
 from arlight.rendering.default_object import default_object
-from arlight.rendering.mesh_file import load_mesh
-from arlight.rendering.relight import Relighter, RelightSettings
-
-
-@dataclass(frozen=True)
-class RelightingOptions:
-    """The object that is drawn on the sheet."""
-
-    object: OptionalFile = None
-    """A mesh to draw (.glb, .obj, .ply, .stl); an object of our own by default."""
-    settings: tyro.conf.OmitArgPrefixes[RelightSettings] = field(default_factory=RelightSettings)
+from arlight.rendering.mesh import Mesh
+from arlight.rendering.relight import Relighter
 
 
 def make_relighter(
@@ -39,9 +29,16 @@ def make_relighter(
         MeshError: the object cannot be used.
         RenderingUnavailableError: there is no headless OpenGL.
     """
-    mesh = default_object() if options.object is None else load_mesh(options.object)
+    mesh = default_object() if options.object is None else _read(options.object)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing the object", total=1.0)
         return Relighter(
             mesh, probe, camera, options.settings, lambda share: progress.update(task, completed=share), order
         )
+
+
+def _read(path: Path) -> Mesh:
+    # here, because reading files needs trimesh, which takes long to load
+    from arlight.rendering.mesh_file import load_mesh
+
+    return load_mesh(path)

@@ -10,13 +10,12 @@ from threadpoolctl import threadpool_limits
 from arlight.calibration.layers.self_calibration import SelfCalibration, self_calibrate
 from arlight.calibration.layers.view_measurement import find_sheet
 from arlight.camera import Camera
+from arlight.commands.options.calibrate_self import FIRST_SECONDS
 from arlight.errors import CalibrationError
 from arlight.probe.design import Probe
 from arlight.video.frame import Frame
 from arlight.video.reader import VideoReader
 
-FIRST_SECONDS = 6.0
-"""How much of a clip is looked at by default [s]."""
 _MOST_FRAMES = 120
 """Frames that are kept at most; of a faster clip every n-th is looked at."""
 

@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from arlight.camera import Camera
-from arlight.commands.options import OptionalFile
-from arlight.commands.self_calibration import self_calibrate_clip
+from arlight.commands.options.footage import CalibrationOptions
 from arlight.errors import CalibrationError
 from arlight.estimation.fixed_estimator import FixedCalibration, FixedEstimator
 from arlight.probe.assembly import Assembly
@@ -14,21 +12,6 @@ from arlight.probe.assembly_storage import load_assembly, load_vignetting
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
 from arlight.video.sidecars import find_sidecar
-
-EstimatorName = Literal["model", "fixed"]
-
-
-@dataclass(frozen=True)
-class CalibrationOptions:
-    """How the sheet was printed and put together; found beside the clip where it is not given."""
-
-    calibration: OptionalFile = None
-    """NAME.calibration.json of the sheet as it was printed and put together, from `arlight calibrate`."""
-    self_calibrate: bool = False
-    """Calibrate the sheet on the first seconds of the clip itself; the camera must move over it."""
-    estimator: EstimatorName = "model"
-    """model: for every view; fixed: the paper's L = MV, right for one view alone, with --calibration NAME.fixed.npz
-    from `arlight calibrate known --estimator fixed`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +46,9 @@ def calibration_of(clip: Path, options: CalibrationOptions, probe: Probe, camera
     if options.estimator == "fixed":
         return _fixed(options, probe)
     if options.self_calibrate:
+        # here, because it takes long to load what only few runs need
+        from arlight.commands.self_calibration import self_calibrate_clip
+
         found = self_calibrate_clip(clip, probe, camera)
         note = f"{clip}: sheet calibrated on {found.views} views (residual chi-square {found.chi2:.2f})"
         return SheetCalibration(found.assembly, found.vignetting, note=note)

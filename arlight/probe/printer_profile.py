@@ -3,17 +3,14 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 from arlight.errors import OutputError, ProbeError
 from arlight.probe.fields import Field
 from arlight.probe.halftone import Tones
+from arlight.probe.resolution import RESOLUTIONS, Dpi
 from arlight.probe.tone import ToneCurve
 
-Dpi = Literal[300, 360, 600, 720, 1200]
-
-RESOLUTIONS: tuple[Dpi, ...] = get_args(Dpi)
-"""Printers' resolutions [dots per inch]."""
 FORMAT = "arlight-printer"
 VERSION = 1
 

@@ -18,7 +18,7 @@ from arlight.probe.dots_image import draw_dots
 from arlight.probe.halftone import MM_PER_INCH, Bilevel, even_tone
 from arlight.probe.page_marks import draw_crop_marks, draw_crosses, draw_ruler, draw_title, placement
 from arlight.probe.pages import Paper
-from arlight.probe.printer_profile import RESOLUTIONS, Dpi
+from arlight.probe.resolution import RESOLUTIONS, Dpi
 from arlight.probe.tone import ToneCurve
 
 Array = NDArray[np.float64]

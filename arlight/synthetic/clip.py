@@ -8,13 +8,12 @@ from arlight.errors import OutputError
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.probe.storage import save_probe
-from arlight.synthetic.settings import SynthesisSettings
+from arlight.synthetic.settings import CRF, SynthesisSettings
 from arlight.synthetic.sheet import SheetLayers
 from arlight.synthetic.synthesis import SyntheticFrame, synthesize
 from arlight.synthetic.truth import ClipTruth, FrameTruth, save_truth
 from arlight.video.writer import VideoWriter
 
-CRF = 16
 PRESET = "slow"
 TUNE = "psnr"
 """Measured values matter more than looks, and nobody waits for the frames."""

@@ -13,6 +13,8 @@ from arlight.synthetic.motion import PATHS, PathName
 from arlight.synthetic.sensor import Sensor
 
 DEFAULT_FRAME_RATE = Fraction(25)
+CRF = 16
+"""Quality of a clip's H.264, 0 (lossless) to 51."""
 
 
 @dataclass(frozen=True, slots=True)

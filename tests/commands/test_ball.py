@@ -11,7 +11,8 @@ from PIL import Image
 from arlight.benchmark.probe_scene import MIRROR_REFLECTANCE, ProbeScene
 from arlight.calibration.ball.ball_outline import BallError
 from arlight.calibration.ball.photographs import PhotographError
-from arlight.commands.ball import BallOptions, run
+from arlight.commands.ball import run
+from arlight.commands.options.ball import BallOptions
 from arlight.environment import Environment
 from arlight.errors import ArlightError, CameraError, OutputError, ProbeError
 from arlight.probe.layout import design_probe

@@ -6,7 +6,8 @@ import pytest
 
 from arlight.calibration.camera.charuco import CharucoBoard
 from arlight.camera import Camera, Pose
-from arlight.commands.calibrate_camera import CalibrateCameraOptions, run
+from arlight.commands.calibrate_camera import run
+from arlight.commands.options.calibrate_camera import CalibrateCameraOptions
 from arlight.errors import ArlightError, CalibrationError, CameraError, OutputError, VideoError
 from arlight.probe.layout import design_probe
 from arlight.probe.storage import save_probe

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from arlight.camera import Camera
-from arlight.commands.calibrate_known import CalibrateKnownOptions, run
-from arlight.commands.footage import SheetAndCamera
+from arlight.commands.calibrate_known import run
+from arlight.commands.options.calibrate_known import CalibrateKnownOptions
+from arlight.commands.options.footage import SheetAndCamera
 from arlight.errors import ArlightError, CalibrationError, CameraError, EnvironmentMapError, OutputError
 from arlight.probe.layout import design_probe
 from arlight.probe.storage import save_probe

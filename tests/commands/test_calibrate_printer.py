@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from arlight.color import encoded_from_linear
-from arlight.commands.calibrate_printer import CalibratePrinterOptions, run
+from arlight.commands.calibrate_printer import run
+from arlight.commands.options.calibrate_printer import CalibratePrinterOptions
 from arlight.errors import OutputError, ProbeError
 from arlight.probe.assembly import Print
 from arlight.probe.printer_profile import load_profile

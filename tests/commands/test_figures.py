@@ -9,7 +9,8 @@ from PIL import Image
 from arlight.benchmark.comparison import METHODS
 from arlight.benchmark.figures import FigureError
 from arlight.benchmark.relit_objects import MATERIALS
-from arlight.commands.figures import FiguresOptions, run
+from arlight.commands.figures import run
+from arlight.commands.options.figures import FiguresOptions
 from arlight.errors import EnvironmentMapError, OutputError
 
 SMALL = {"order": 1, "size": (640, 360), "environments": ("apartment",)}

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from arlight.camera import Camera
-from arlight.commands.footage import FootageOptions, check_result, open_footage, shows_the_sheet
+from arlight.commands.footage import check_result, open_footage, shows_the_sheet
+from arlight.commands.options.footage import FootageOptions
 from arlight.errors import CameraError, ProbeError, VideoError
 from arlight.probe.assembly import Assembly
 from arlight.probe.assembly_storage import save_assembly

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from arlight.commands.prove import ProveOptions, run
+from arlight.commands.options.prove import ProveOptions
+from arlight.commands.prove import run
 from arlight.errors import OutputError, ProbeError, VideoError
 
 TRACED = Path(__file__).parents[1] / "data" / "traced"

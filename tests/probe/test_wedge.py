@@ -5,7 +5,7 @@ import pytest
 
 from arlight.errors import OutputError
 from arlight.probe.pages import PAPERS, largest_sheet_mm
-from arlight.probe.printer_profile import RESOLUTIONS
+from arlight.probe.resolution import RESOLUTIONS
 from arlight.probe.tone import ToneCurve
 from arlight.probe.wedge import (
     GAP_MM,

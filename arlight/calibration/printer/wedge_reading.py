@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from arlight.color import linear_from_encoded
 from arlight.errors import ProbeError
-from arlight.probe.printer_profile import RESOLUTIONS, Dpi
+from arlight.probe.resolution import RESOLUTIONS, Dpi
 from arlight.probe.tone import ToneCurve
 from arlight.probe.wedge import (
     DICTIONARY,

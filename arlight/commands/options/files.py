@@ -1,4 +1,4 @@
-"""What several subcommands' options have in common."""
+"""Files on the command line."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,0 +1,37 @@
+"""What `arlight run` takes."""
+
+from dataclasses import dataclass, field
+
+import tyro
+
+from arlight.commands.encoding import EncodingOptions
+from arlight.commands.options.files import OptionalFile, PositionalFile
+from arlight.commands.options.footage import FootageOptions
+from arlight.commands.options.relighting import RelightingOptions
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Relight a recorded clip: track the sheet, estimate its light, draw an object under that light.
+
+    Ctrl-C ends the run after the frame in hand; all files are then complete up to it. An existing file is replaced only
+    when the run ends and the sheet was seen: until then the new one grows beside it as NAME.partial.EXT. A new file
+    grows under its own name. Either can be read up to the last frames even if the program is killed.
+    """
+
+    clip: PositionalFile
+    """The video of the sheet; probe.json and camera.json beside it are found by themselves."""
+    output: OptionalFile = None
+    """The relit video; CLIP-relit.mp4 in the current folder by default."""
+    lighting: OptionalFile = None
+    """Pose and lighting, one JSON line a frame as it is done; with --no-render CLIP.jsonl in the current folder by
+    default."""
+    report: OptionalFile = None
+    """An HTML page with the coefficients over time and the recovered light beside thumbnails."""
+    render: bool = True
+    """Draw the object and write the relit video; --no-render only estimates pose and lighting, without OpenGL."""
+    order: int | None = None
+    """Highest order of the light that is told and drawn with, 0 to the sheet's; the sheet's by default."""
+    footage: tyro.conf.OmitArgPrefixes[FootageOptions] = field(default_factory=FootageOptions)
+    relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
+    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
