@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from arlight.probe.design import Probe as Probe
     from arlight.probe.storage import load_probe as load_probe
     from arlight.rendering.relight import Relighter as Relighter
-    from arlight.rendering.relight import RelightSettings as RelightSettings
+    from arlight.rendering.settings import RelightSettings as RelightSettings
     from arlight.results.log import read_log as read_log
     from arlight.video.frame import Frame as Frame
     from arlight.video.reader import VideoReader as VideoReader
@@ -37,7 +37,7 @@ _PUBLIC = {
     "Pipeline": "arlight.pipeline",
     "Pose": "arlight.camera",
     "Probe": "arlight.probe.design",
-    "RelightSettings": "arlight.rendering.relight",
+    "RelightSettings": "arlight.rendering.settings",
     "Relighter": "arlight.rendering.relight",
     "TrackerSettings": "arlight.lighting_tracker",
     "VideoReader": "arlight.video.reader",

@@ -1,7 +1,6 @@
 """Lights an object on the sheet with estimated coefficients and sets it into the frame."""
 
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +14,14 @@ from arlight.rendering.draw import ObjectRenderer
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.projection import View, project, union
-from arlight.rendering.pyrender_drawer import PyrenderDrawer
 from arlight.rendering.reconstruction import reconstruct
+from arlight.rendering.settings import RelightSettings
 from arlight.rendering.transfer import precompute_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
 
 _DARKENING = 0.008
 """A shadow that takes less than this share of the light is below one 8-bit level, and pixels of less are left alone."""
-
-
-RendererName = Literal["moderngl", "pyrender"]
 
 
 class ObjectDrawer(Protocol):
@@ -48,32 +44,6 @@ class ProbeGlass(Protocol):
     @property
     def frequencies(self) -> NDArray[np.int64]:
         """(k, 2) frequencies that the sheet measures."""
-
-
-@dataclass(frozen=True, slots=True)
-class RelightSettings:
-    """How the object stands on the sheet and how it is lit."""
-
-    size_mm: float = 50.0
-    """Largest side of the object's bounding box [mm]."""
-    position_mm: tuple[float, float] = (0.0, 0.0)
-    """Where the middle of the object stands, probe frame [mm]."""
-    yaw_deg: float = 0.0
-    """Turn of the object about the sheet's normal, counter-clockwise from above [deg]."""
-    roughness: float = 0.3
-    """Perceptual roughness of the gloss, in [0.05, 1]."""
-    normal_reflectance: float = 0.04
-    """Fresnel reflectance at normal incidence: 0.04 a varnish, 0 a matte object."""
-    surroundings_albedo: float = 0.3
-    """ASSUMED albedo of what surrounds the object: light from below is this over pi times the irradiance, in [0, 1]."""
-    directions: int = 768
-    """Directions of the hemisphere along which the object's shadows are cast."""
-    shadow_texels: int = 128
-    """Side of the map of the shadow on the sheet."""
-    supersampling: int = 2
-    """Samples along a pixel's side."""
-    renderer: RendererName = "moderngl"
-    """`moderngl`: precomputed transfer; `pyrender`: the light as a few directional lights with shadow maps, slow."""
 
 
 class Relighter:
@@ -169,6 +139,9 @@ class Relighter:
         if self._opened is None:
             s = self.settings
             if s.renderer == "pyrender":
+                # here, because what it needs takes long to load and it is seldom asked for
+                from arlight.rendering.pyrender_drawer import PyrenderDrawer
+
                 self._opened = PyrenderDrawer(self.mesh, self._reconstruction, self._camera, s.roughness)
             else:
                 rows = gloss_rows(self._reconstruction, s.roughness)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from arlight.rendering.default_object import default_object
-from arlight.rendering.relight import Relighter, RelightSettings
+from arlight.rendering.relight import Relighter
+from arlight.rendering.settings import RelightSettings
 
 pytestmark = pytest.mark.usefixtures("gl")
 

@@ -10,7 +10,8 @@ from arlight.errors import ProbeError
 from arlight.rendering.default_object import default_object
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.relight import Relighter, RelightSettings
+from arlight.rendering.relight import Relighter
+from arlight.rendering.settings import RelightSettings
 from arlight.synthetic.captured import load_environment
 from arlight.video.frame import Frame
 

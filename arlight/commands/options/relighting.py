@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import tyro
 
 from arlight.commands.options.files import OptionalFile
-from arlight.rendering.relight import RelightSettings
+from arlight.rendering.settings import RelightSettings
 
 
 @dataclass(frozen=True)
