@@ -7,9 +7,10 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-/* Hot loops are compiled for several processors; the best one is chosen when the library is loaded. */
-#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__)
-#define HOT __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
+/* Hot loops are compiled for several processors; the best one is chosen when the library is loaded. Levels of the
+   instruction set, not names of processors: a name is chosen on that very model only. */
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && __GNUC__ >= 12 && !defined(__clang__)
+#define HOT __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define HOT
 #endif
