@@ -12,8 +12,8 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import j0
 
+from arlight.estimation.bessel import bessel_j0
 from arlight.estimation.layer_series import (
     HARMONICS,
     convolution,
@@ -172,7 +172,7 @@ def upper_face_return(slab: Slab, frequency: ArrayLike) -> Array:
     face = slab.interface_reflectance(mu)
     sine = np.sqrt(1.0 - mu**2)
     radius = np.linalg.norm(slab.light_plane(np.stack([sine, 0 * sine, mu], axis=-1)), axis=-1)
-    kernel = j0(2.0 * np.pi * np.multiply.outer(np.asarray(frequency, float), radius))
+    kernel = bessel_j0(2.0 * np.pi * np.multiply.outer(np.asarray(frequency, float), radius))
     return kernel @ (weight * face * (1.0 - face) ** 2)
 
 
