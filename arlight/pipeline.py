@@ -19,6 +19,9 @@ class FrameRelighter(Protocol):
     def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
         """The frame with the lit object in it; the frame itself where pose or light is not known."""
 
+    def release(self) -> None:
+        """Give back what belongs to the thread that renders, such as an OpenGL context; called from that thread."""
+
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
@@ -76,12 +79,24 @@ class Pipeline:
         Frames are to come in order; a frame without the sheet in view is answered with the status `coasting` or
         `lost`, never with an exception.
         """
-        estimate = self._tracker.update(frame)
+        return self.relight(frame, self.estimate(frame))
+
+    def estimate(self, frame: Frame) -> FrameEstimate:
+        """The first half of `process`: track the sheet and estimate its light; frames are to come in order."""
+        return self._tracker.update(frame)
+
+    def relight(self, frame: Frame, estimate: FrameEstimate) -> FrameResult:
+        """The second half: draw the object; from one thread, which need not be the one that estimates."""
         started = perf_counter()
         composite = frame
         if self._relighter is not None:
             composite = self._relighter.render(frame, estimate.pose.camera_from_probe, estimate.lighting)
         return FrameResult(composite, estimate, estimate.timings_s | {"render": perf_counter() - started})
+
+    def release(self) -> None:
+        """Give back what belongs to the thread that relights, from that thread; it is acquired again when needed."""
+        if self._relighter is not None:
+            self._relighter.release()
 
     def reset(self) -> None:
         """Forget pose and light, as before the first frame."""

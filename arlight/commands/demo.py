@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
-from arlight.commands.loop import Sinks, Work, run_frames
+from arlight.commands.loop import Work, run_frames
 from arlight.commands.options.demo import DemoOptions
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.commands.relighting import make_relighter
@@ -13,6 +13,7 @@ from arlight.errors import ArlightError
 from arlight.pipeline import Pipeline
 from arlight.probe.design import Probe
 from arlight.probe.layout import design_probe
+from arlight.results.frame_loop import Sinks
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.statistics import RunStatistics

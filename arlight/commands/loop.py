@@ -1,33 +1,15 @@
 """Frames through the pipeline into the outputs, with progress, until they end or Ctrl-C."""
 
 from collections.abc import Iterable
-from contextlib import closing
 from dataclasses import dataclass
-from time import perf_counter
-from types import TracebackType
-from typing import Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-from arlight.commands.background import InOrder, prefetched
 from arlight.commands.interruption import Interruption
-from arlight.pipeline import FrameResult, Pipeline
-from arlight.results.log import LightingLogWriter
-from arlight.results.record import LogRecord
-from arlight.results.report import ReportRecorder
+from arlight.results.frame_loop import FrameStages, Sinks, frame_loop
 from arlight.results.statistics import RunStatistics
 from arlight.video.frame import Frame
-
-
-class FrameSink(Protocol):
-    """What takes finished frames."""
-
-    def write(self, frame: Frame) -> None:
-        """Take the next frame."""
-
-    def close(self) -> None:
-        """Finish the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,36 +24,10 @@ class Work:
     """Name of the stage that the frames come from."""
 
 
-@dataclass(slots=True)
-class Sinks:
-    """Where results go, each optional; leaving the `with` block closes the files, whatever happened."""
-
-    video: FrameSink | None = None
-    """Takes the composites."""
-    log: LightingLogWriter | None = None
-    """Takes pose and lighting."""
-    report: ReportRecorder | None = None
-    """Remembers what the report will show."""
-
-    def __enter__(self) -> "Sinks":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        # the log first: closing a video can fail on a full disk
-        if self.log is not None:
-            self.log.close()
-        if self.video is not None:
-            self.video.close()
-
-
 def run_frames(
-    frames: Iterable[Frame], pipeline: Pipeline, sinks: Sinks, statistics: RunStatistics, work: Work
+    frames: Iterable[Frame], pipeline: FrameStages, sinks: Sinks, statistics: RunStatistics, work: Work
 ) -> bool:
-    """The loop: decode, process, encode, log; Ctrl-C ends it after the frame in hand.
-
-    Frames come from one thread, are processed in the caller's, and go into the sinks from a third.
+    """The loop: decode, estimate, relight, encode, log; Ctrl-C ends it after the frames in hand.
 
     Args:
         frames: in order.
@@ -83,36 +39,17 @@ def run_frames(
     Returns:
         Whether it was interrupted.
     """
-
-    def finish(processed: tuple[FrameResult, float]) -> None:
-        statistics.add(_write(*processed, work.source, sinks))
-        progress.advance(statistics)
-
     with (
         Interruption() as interruption,
         FrameProgress(work) as progress,
-        InOrder(finish) as results,
-        closing(prefetched(frames)) as source,
+        frame_loop(frames, pipeline, sinks, work.source) as records,
     ):
-        for frame, source_s in source:
-            results.put((pipeline.process(frame), source_s))
+        for record in records:
+            statistics.add(record)
+            progress.advance(statistics)
             if interruption.requested:
-                break
+                records.stop()
     return interruption.requested
-
-
-def _write(result: FrameResult, source_s: float, source: str, sinks: Sinks) -> LogRecord:
-    timings = {source: source_s, **result.timings_s}
-    if sinks.video is not None:
-        started = perf_counter()
-        sinks.video.write(result.composite)
-        timings["encode"] = perf_counter() - started
-    record = LogRecord.of(result.estimate, timings)
-    if sinks.log is not None:
-        sinks.log.write(record)
-    if sinks.report is not None:
-        sinks.report.add(record, result.composite)
-    return record
 
 
 class FrameProgress:

@@ -6,7 +6,7 @@ from rich.console import Console
 
 from arlight.commands.footage import Footage, check_result, open_footage, shows_the_sheet
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
-from arlight.commands.loop import Sinks, Work, run_frames
+from arlight.commands.loop import Work, run_frames
 from arlight.commands.options.run import RunOptions
 from arlight.commands.outputs import Output, abandon, prepare_outputs
 from arlight.commands.relighting import make_relighter
@@ -14,6 +14,7 @@ from arlight.commands.summary import print_summary
 from arlight.errors import ArlightError, OutputError, ProbeError
 from arlight.lighting_tracker import TrackerSettings
 from arlight.pipeline import Pipeline
+from arlight.results.frame_loop import Sinks
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.report import ReportRecorder

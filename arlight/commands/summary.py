@@ -8,6 +8,8 @@ from rich.table import Table
 
 from arlight.results.statistics import RunStatistics
 
+_NEARLY_ALL = 0.95
+
 
 def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interrupted: bool) -> None:
     """Print what a run amounts to and where its results are.
@@ -22,9 +24,20 @@ def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interr
     table.add_row("frames", f"{statistics.frames}{state}")
     counts = ", ".join(f"{count} {status}" for status, count in sorted(statistics.statuses.items(), reverse=True))
     table.add_row("sheet", f"{100.0 * statistics.tracked_share:.1f} % tracked ({counts})")
-    table.add_row("speed", f"{statistics.frames_per_second:.1f} frames/s")
+    table.add_row("speed", _speed(statistics))
     stages = ", ".join(f"{stage} {ms:.1f}" for stage, ms in statistics.median_ms.items())
     table.add_row("ms per frame", f"{stages} (medians)")
     for what, path in written.items():
         table.add_row(what, str(path))
     Console(soft_wrap=True, highlight=False, markup=False).print(table)
+
+
+def _speed(statistics: RunStatistics) -> str:
+    """Frames per second, and how long a frame took at most in half of the cases and nearly always."""
+    text = f"{statistics.frames_per_second:.1f} frames/s"
+    if statistics.frames > 1:
+        half, most = statistics.wall_quantile_ms(0.5), statistics.wall_quantile_ms(_NEARLY_ALL)
+        text += f", a frame every {half:.1f} ms, {100.0 * _NEARLY_ALL:.0f} % within {most:.1f} ms"
+    if statistics.deadline_ms is not None:
+        text += f", {statistics.late} later than {statistics.deadline_ms:g} ms"
+    return text

@@ -30,6 +30,7 @@ _UNITS = {
     "reprojection_rms_px": "px",
     "time_s": "s",
     "timings_ms": "ms",
+    "wall_ms": "ms, from the end of the frame before to the end of this one",
 }
 _CONVENTIONS = {
     "probe": "right-handed, origin at the centre of the film, x right and y up as printed, z out of the sheet",
@@ -190,6 +191,7 @@ def _record_json(record: LogRecord) -> dict[str, Any]:
         "chi2": _number(record.chi2),
         "unexplained": _number(record.unexplained),
         "timings_ms": {stage: _number(ms) for stage, ms in record.timings_ms.items()},
+        "wall_ms": _number(record.wall_ms),
     }
 
 
@@ -213,6 +215,7 @@ def _record_from(content: dict[str, Any], count: int) -> LogRecord:
         chi2=_or_nan(content["chi2"]),
         timings_ms={stage: _or_nan(ms) for stage, ms in content["timings_ms"].items()},
         unexplained=_or_nan(content.get("unexplained")),
+        wall_ms=_or_nan(content.get("wall_ms")),
     )
 
 

@@ -63,10 +63,13 @@ class LogRecord:
     """Milliseconds per stage."""
     unexplained: float = math.nan
     """Share of the stripes that the probe does not explain under any light; nan where none are resolved."""
+    wall_ms: float = math.nan
+    """Milliseconds from the end of the frame before to the end of this one; stages overlap, so that it is less than
+    their sum; nan for the first frame."""
 
     @classmethod
-    def of(cls, estimate: FrameEstimate, timings_s: dict[str, float]) -> "LogRecord":
-        """The record of a frame's estimate, with the time that each stage took [s]."""
+    def of(cls, estimate: FrameEstimate, timings_s: dict[str, float], wall_s: float = math.nan) -> "LogRecord":
+        """The record of a frame's estimate, with the time that each stage took, and that since the last frame [s]."""
         lighting, pose = estimate.lighting, estimate.pose
         return cls(
             frame=estimate.index,
@@ -80,4 +83,5 @@ class LogRecord:
             chi2=math.nan if lighting is None else lighting.chi2,
             timings_ms={stage: 1000.0 * seconds for stage, seconds in timings_s.items()},
             unexplained=estimate.unexplained,
+            wall_ms=1000.0 * wall_s,
         )

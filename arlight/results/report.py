@@ -14,10 +14,13 @@ from arlight.color import encoded_from_linear
 from arlight.errors import OutputError
 from arlight.fourier import synthesise
 from arlight.results.record import LogHeader, LogRecord
+from arlight.results.sample import EvenSample
 from arlight.results.statistics import RunStatistics
 from arlight.video.frame import Frame
 
 _THUMBNAILS = 12
+# from half of them on, as many as a chart shows points
+_RECORDS = 800
 _THUMBNAIL_WIDTH_PX = 256
 _DISK_PX = 144
 # share of the disk's pixels that may be brighter than its white
@@ -48,25 +51,19 @@ class Thumbnail:
 
 @dataclass(slots=True)
 class ReportRecorder:
-    """Remembers, during a run, what its report will show."""
+    """Remembers, during a run, what its report will show; constant memory, and the length need not be known."""
 
     header: LogHeader
     """What the frames have in common."""
-    records: list[LogRecord] = field(default_factory=list)
-    """Every frame, without its picture."""
-    thumbnails: list[Thumbnail] = field(default_factory=list)
-    """Pictures of some frames, evenly spread, at most twice as many as are shown."""
-    stride: int = 1
-    """One frame in so many is kept as a picture; grows with the run, whose length need not be known."""
+    records: EvenSample[LogRecord] = field(default_factory=lambda: EvenSample(_RECORDS))
+    """Frames without their pictures."""
+    thumbnails: EvenSample[Thumbnail] = field(default_factory=lambda: EvenSample(2 * _THUMBNAILS))
+    """Pictures of some frames, less than twice as many as are shown."""
 
     def add(self, record: LogRecord, frame: Frame) -> None:
         """Remember a finished frame."""
-        if len(self.records) % self.stride == 0:
-            self.thumbnails.append(Thumbnail(record, _small_picture(frame)))
-        self.records.append(record)
-        if len(self.thumbnails) >= 2 * _THUMBNAILS:
-            self.thumbnails = self.thumbnails[::2]
-            self.stride *= 2
+        self.records.add(record)
+        self.thumbnails.offer(lambda: Thumbnail(record, _small_picture(frame)))
 
     def write(self, path: Path, statistics: RunStatistics) -> None:
         """Write the page.
@@ -74,8 +71,9 @@ class ReportRecorder:
         Raises:
             OutputError: the file cannot be written.
         """
-        step = max(1, -(-len(self.thumbnails) // _THUMBNAILS))
-        page = report_page(self.header, self.records, self.thumbnails[::step], statistics)
+        thumbnails = self.thumbnails.items
+        step = max(1, -(-len(thumbnails) // _THUMBNAILS))
+        page = report_page(self.header, self.records.items, thumbnails[::step], statistics)
         try:
             path.write_text(page, encoding="utf-8")
         except OSError as error:

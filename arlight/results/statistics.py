@@ -1,26 +1,42 @@
-"""What a run amounts to: frames by status, frame rate, median milliseconds per stage."""
+"""What a run amounts to: frames by status, frame rate, typical milliseconds per stage; constant memory."""
 
 from collections import Counter
 from dataclasses import dataclass, field
-from math import nan
+from math import isnan, nan
 from statistics import median
 from time import perf_counter
 
+import numpy as np
+
 from arlight.results.record import LogRecord
+from arlight.results.sample import EvenSample
+
+_KEPT = 4096
+"""Values that a median is taken of are fewer than this, and exact for runs of fewer frames."""
+
+
+def _sample() -> EvenSample[float]:
+    return EvenSample(_KEPT)
 
 
 @dataclass(slots=True)
 class RunStatistics:
     """Running totals of a loop over frames."""
 
+    deadline_ms: float | None = None
+    """Time that a frame may take in the loop; None where there is no such limit."""
+    late: int = 0
+    """Frames that took longer."""
     statuses: Counter[str] = field(default_factory=Counter)
     """Frames by status."""
-    stages_ms: dict[str, list[float]] = field(default_factory=dict)
-    """Milliseconds of every frame by stage."""
-    chi2: list[float] = field(default_factory=list)
-    """Residual chi-square of every tracked frame that has one."""
-    unexplained: list[float] = field(default_factory=list)
-    """Share of the stripes that the probe does not explain, of every tracked frame that resolves them."""
+    stages_ms: dict[str, EvenSample[float]] = field(default_factory=dict)
+    """Milliseconds by stage."""
+    wall_ms: EvenSample[float] = field(default_factory=_sample)
+    """Milliseconds from the end of one frame to the end of the next."""
+    chi2: EvenSample[float] = field(default_factory=_sample)
+    """Residual chi-square of the tracked frames that have one."""
+    unexplained: EvenSample[float] = field(default_factory=_sample)
+    """Share of the stripes that the probe does not explain, of the tracked frames that resolve them."""
     started_s: float = field(default_factory=perf_counter)
     """Clock when the loop began [s]."""
     elapsed_s: float = 0.0
@@ -30,11 +46,16 @@ class RunStatistics:
         """Count a frame that is finished."""
         self.statuses[record.status] += 1
         for stage, ms in record.timings_ms.items():
-            self.stages_ms.setdefault(stage, []).append(ms)
-        if record.status == "tracked" and record.chi2 == record.chi2:
-            self.chi2.append(record.chi2)
-        if record.status == "tracked" and record.unexplained == record.unexplained:
-            self.unexplained.append(record.unexplained)
+            if stage not in self.stages_ms:
+                self.stages_ms[stage] = _sample()
+            self.stages_ms[stage].add(ms)
+        if not isnan(record.wall_ms):
+            self.wall_ms.add(record.wall_ms)
+            self.late += self.deadline_ms is not None and record.wall_ms > self.deadline_ms
+        if record.status == "tracked" and not isnan(record.chi2):
+            self.chi2.add(record.chi2)
+        if record.status == "tracked" and not isnan(record.unexplained):
+            self.unexplained.add(record.unexplained)
         self.elapsed_s = perf_counter() - self.started_s
 
     @property
@@ -60,14 +81,18 @@ class RunStatistics:
     @property
     def median_ms(self) -> dict[str, float]:
         """Median milliseconds per stage."""
-        return {stage: median(values) for stage, values in self.stages_ms.items()}
+        return {stage: median(values.items) for stage, values in self.stages_ms.items()}
+
+    def wall_quantile_ms(self, share: float) -> float:
+        """Milliseconds in which that share of the frames was finished after the one before; nan before the second."""
+        return float(np.quantile(self.wall_ms.items, share)) if self.wall_ms.items else nan
 
     @property
     def median_chi2(self) -> float:
         """Median residual chi-square per degree of freedom; nan where no tracked frame has one."""
-        return median(self.chi2) if self.chi2 else nan
+        return median(self.chi2.items) if self.chi2.items else nan
 
     @property
     def median_unexplained(self) -> float:
         """Median share of the stripes that the probe does not explain; nan where no tracked frame resolves them."""
-        return median(self.unexplained) if self.unexplained else nan
+        return median(self.unexplained.items) if self.unexplained.items else nan

@@ -1,7 +1,9 @@
 """Running totals of a run."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from arlight.results.record import LogRecord
@@ -39,3 +41,24 @@ def test_medians_are_of_what_was_measured():
     statistics.add(record_of(4, "coasting", ms=3.0, chi2=500.0))
     assert statistics.median_ms == {"track": 3.0}
     assert statistics.median_chi2 == 3.0
+
+
+def test_the_whole_loop_is_counted_against_the_deadline():
+    statistics = RunStatistics(deadline_ms=16.0)
+    assert math.isnan(statistics.wall_quantile_ms(0.5))
+    for wall_ms in [math.nan, 15.0, 17.0, 16.0, 40.0]:
+        statistics.add(replace(record_of(0), wall_ms=wall_ms))
+    assert statistics.late == 2
+    assert statistics.wall_quantile_ms(0.5) == pytest.approx(16.5)
+    assert statistics.wall_quantile_ms(1.0) == 40.0
+
+
+def test_medians_of_a_long_run_are_those_of_all_of_it_and_take_no_more_room():
+    statistics = RunStatistics()
+    rng = np.random.default_rng(2)
+    # slower and slower: a sample of the beginning or of the end would be off
+    values = np.linspace(1.0, 3.0, 20_000) * rng.lognormal(0.0, 0.1, 20_000)
+    for frame, ms in enumerate(values):
+        statistics.add(record_of(frame, ms=float(ms)))
+    assert len(statistics.stages_ms["track"].items) < 5000
+    assert statistics.median_ms["track"] == pytest.approx(np.median(values), rel=0.02)

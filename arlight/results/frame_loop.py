@@ -1,0 +1,134 @@
+"""The frame loop in threads: frames from their source through the pipeline into the files, one record a frame."""
+
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
+from math import nan
+from time import perf_counter
+from types import TracebackType
+from typing import Protocol
+
+from arlight.chain import Chain, Stage
+from arlight.lighting_tracker import FrameEstimate
+from arlight.pipeline import FrameResult
+from arlight.results.log import LightingLogWriter
+from arlight.results.record import LogRecord
+from arlight.results.report import ReportRecorder
+from arlight.video.frame import Frame
+
+
+class FrameStages(Protocol):
+    """The halves of the work on a frame, such as a `Pipeline`'s."""
+
+    def estimate(self, frame: Frame) -> FrameEstimate:
+        """Pose and light of the next frame."""
+
+    def relight(self, frame: Frame, estimate: FrameEstimate) -> FrameResult:
+        """The frame with the lit object in it."""
+
+    def release(self) -> None:
+        """Give back what belongs to the thread that relights."""
+
+
+class FrameSink(Protocol):
+    """What takes finished frames."""
+
+    def write(self, frame: Frame) -> None:
+        """Take the next frame."""
+
+    def close(self) -> None:
+        """Finish the file."""
+
+
+@dataclass(slots=True)
+class Sinks:
+    """Where results go, each optional; leaving the `with` block closes the files, whatever happened."""
+
+    video: FrameSink | None = None
+    """Takes the composites."""
+    log: LightingLogWriter | None = None
+    """Takes pose and lighting."""
+    report: ReportRecorder | None = None
+    """Remembers what the report will show."""
+
+    def __enter__(self) -> "Sinks":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # the log first: closing a video can fail on a full disk
+        if self.log is not None:
+            self.log.close()
+        if self.video is not None:
+            self.video.close()
+
+
+def frame_loop(
+    frames: Iterable[Frame], pipeline: FrameStages, sinks: Sinks, source: str = "decode"
+) -> Chain[LogRecord]:
+    """The loop, to be started by a `with` block and driven by taking its records.
+
+    Decoding, estimating, relighting (which alone touches OpenGL) and writing have a thread each. A record comes when
+    its frame is in the files.
+
+    Args:
+        frames: in order.
+        pipeline: what is done with each.
+        sinks: where the results go; to be closed after the loop.
+        source: name of the stage that the frames come from.
+    """
+    work = _FrameWork(pipeline, sinks, source)
+    stages = [
+        Stage("estimate", work.estimate),
+        Stage("relight", work.relight, pipeline.release),
+        Stage("write", work.write),
+    ]
+    return Chain(_timed(frames), stages)
+
+
+@dataclass(slots=True)
+class _FrameWork:
+    """What the threads do; what they hand on carries the seconds that the source took."""
+
+    pipeline: FrameStages
+    sinks: Sinks
+    source: str
+    finished_s: float = nan
+    """Clock when the last frame was in the files [s]."""
+
+    def estimate(self, taken: tuple[Frame, float]) -> tuple[Frame, float, FrameEstimate]:
+        frame, source_s = taken
+        return frame, source_s, self.pipeline.estimate(frame)
+
+    def relight(self, estimated: tuple[Frame, float, FrameEstimate]) -> tuple[FrameResult, float]:
+        frame, source_s, estimate = estimated
+        return self.pipeline.relight(frame, estimate), source_s
+
+    def write(self, relit: tuple[FrameResult, float]) -> LogRecord:
+        result, source_s = relit
+        timings = {self.source: source_s, **result.timings_s}
+        if self.sinks.video is not None:
+            started = perf_counter()
+            self.sinks.video.write(result.composite)
+            timings["encode"] = perf_counter() - started
+        before, self.finished_s = self.finished_s, perf_counter()
+        record = LogRecord.of(result.estimate, timings, self.finished_s - before)
+        if self.sinks.log is not None:
+            self.sinks.log.write(record)
+        if self.sinks.report is not None:
+            self.sinks.report.add(record, result.composite)
+        return record
+
+
+def _timed(frames: Iterable[Frame]) -> Generator[tuple[Frame, float], None, None]:
+    """Every frame with the seconds that its source took for it; a source that can be closed is."""
+    iterator = iter(frames)
+    try:
+        started = perf_counter()
+        for frame in iterator:
+            yield frame, perf_counter() - started
+            started = perf_counter()
+    finally:
+        close = getattr(iterator, "close", None)
+        if close is not None:
+            close()
