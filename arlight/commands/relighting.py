@@ -1,23 +1,24 @@
-"""The object that is drawn, where it stands and what draws it."""
+"""The object that is drawn, prepared while the first frames are read and estimated."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import Progress
-
-from arlight.camera import Camera
+from arlight.camera import Camera, Pose
 from arlight.commands.options.relighting import RelightingOptions
+from arlight.estimation.lighting import Lighting
 from arlight.pipeline import FrameRelighter
 from arlight.probe.design import Probe
 from arlight.rendering.default_object import default_object
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.relight import Relighter
+from arlight.rendering.settings import RelightSettings
+from arlight.video.frame import Frame
 
 
 def make_relighter(
     options: RelightingOptions, probe: Probe, camera: Camera, order: int | None = None
 ) -> FrameRelighter:
-    """Load the object and fold its shadows into matrices, with a progress line.
+    """Load the object and begin to fold its shadows into matrices, which goes on beside the caller's work.
 
     Args:
         options: the object and how it stands on the sheet.
@@ -27,14 +28,28 @@ def make_relighter(
 
     Raises:
         MeshError: the object cannot be used.
-        RenderingUnavailableError: there is no headless OpenGL.
     """
     mesh = default_object() if options.object is None else _read(options.object)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("preparing the object", total=1.0)
-        return Relighter(
-            mesh, probe, camera, options.settings, lambda share: progress.update(task, completed=share), order
-        )
+    return _PreparedRelighter(mesh, probe, camera, options.settings, order)
+
+
+class _PreparedRelighter:
+    """A relighter that is made in a thread of its own; the first frame to be drawn waits for it.
+
+    What is wrong with the object on this sheet is raised by `render`.
+    """
+
+    def __init__(self, mesh: Mesh, probe: Probe, camera: Camera, settings: RelightSettings, order: int | None) -> None:
+        thread = ThreadPoolExecutor(1, "prepare")
+        self._made = thread.submit(Relighter, mesh, probe, camera, settings, order=order)
+        thread.shutdown(wait=False)
+
+    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
+        return self._made.result().render(frame, camera_from_probe, lighting)
+
+    def release(self) -> None:
+        if self._made.exception() is None:
+            self._made.result().release()
 
 
 def _read(path: Path) -> Mesh:
