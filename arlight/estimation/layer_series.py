@@ -45,6 +45,14 @@ def turned(series: ComplexArray, lead_rad: Array) -> ComplexArray:
     return np.asarray(series * np.exp(1j * np.multiply.outer(lead_rad, harmonics)), complex)
 
 
+def real_parts(series: ComplexArray) -> Array:
+    """Mean, then real and imaginary parts of harmonics 1..H (..., 2 H + 1), of real functions' series -H..H."""
+    parts = np.empty(series.shape)
+    parts[..., 0] = series[..., HARMONICS].real
+    parts[..., 1::2], parts[..., 2::2] = series[..., HARMONICS + 1 :].real, series[..., HARMONICS + 1 :].imag
+    return parts
+
+
 def convolution(series: ComplexArray) -> ComplexArray:
     """(blocks, m, l) matrices that multiply series -H..H by the given ones (blocks, 2 H + 1), cut at H."""
     size = series.shape[1]

@@ -4,6 +4,8 @@ The coefficients are integrals of the radiance l over the upper hemisphere, L~ =
 and natural light is a smooth isotropic random field of covariance C(w, w') = c0 + c1 exp(-angle(w, w') / a).
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,6 +19,7 @@ Array = NDArray[np.float64]
 _PRIOR_CONSTANT, _PRIOR_VARYING, _PRIOR_ANGLE_RAD = 1.0, 10.0, 0.3
 _TYPICAL_NOISE = 0.003
 """Standard deviation of a coefficient that predictions allow for, relative to the prior's rms of L~_0."""
+_SKY_DIRECTIONS = 1024
 _GOLDEN_ANGLE_RAD = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -26,6 +29,26 @@ def hemisphere_points(count: int) -> Array:
     z = 1.0 - (index + 0.5) / count
     sine, azimuth = np.sqrt(1.0 - z**2), index * _GOLDEN_ANGLE_RAD
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=-1)
+
+
+@cache
+def sky_directions() -> tuple[Array, Array]:
+    """Directions (n, 3) that stand for the hemisphere where light is predicted, and their solid angles (n,) [sr]."""
+    return hemisphere_points(_SKY_DIRECTIONS), np.full(_SKY_DIRECTIONS, 2.0 * np.pi / _SKY_DIRECTIONS)
+
+
+@cache
+def sky_covariance() -> Array:
+    """C (n, n) between `sky_directions`; many sheets need the same."""
+    directions, _ = sky_directions()
+    return radiance_covariance(directions, directions)
+
+
+def predicted_sky(slab: Slab, frequencies: ArrayLike) -> Array:
+    """Radiance (n, 2k - 1) toward `sky_directions` that unit real-packed coefficients predict."""
+    operator = received_operator(slab, frequencies, *sky_directions())
+    told = sky_covariance() @ operator.T
+    return np.asarray(np.linalg.solve(_observed(operator @ told), told.T).T, float)
 
 
 def received_operator(slab: Slab, frequencies: ArrayLike, directions: Array, solid_angle_sr: Array) -> Array:
@@ -54,5 +77,9 @@ def predictor(operator: Array, directions: Array) -> Array:
     S is a fixed share of the prior's own L~_0, so the prediction does not depend on the light's scale.
     """
     gram = operator @ radiance_covariance(directions, directions) @ operator.T
-    noise = _TYPICAL_NOISE**2 * gram[0, 0] * np.eye(len(gram))
-    return np.asarray(np.linalg.solve(gram + noise, operator).T, float)
+    return np.asarray(np.linalg.solve(_observed(gram), operator).T, float)
+
+
+def _observed(gram: Array) -> Array:
+    """Covariance of the coefficients as they are measured, by that of the coefficients."""
+    return np.asarray(gram + _TYPICAL_NOISE**2 * gram[0, 0] * np.eye(len(gram)), float)

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.radiance_prior import hemisphere_points, predictor, radiance_covariance, received_operator
+from arlight.estimation.radiance_prior import predicted_sky, received_operator, sky_covariance, sky_directions
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 
 Array = NDArray[np.float64]
-
-_DIRECTIONS = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +44,10 @@ def resampling(probe: Probe, assembly: Assembly) -> Resampling | None:
     if np.allclose(measured, probe.frequencies, atol=1e-9):
         return None
     slab = assembly.slab(probe)
-    directions = hemisphere_points(_DIRECTIONS)
-    solid_angle = np.full(_DIRECTIONS, 2.0 * np.pi / _DIRECTIONS)
-    seen = received_operator(slab, measured, directions, solid_angle)
-    wanted = received_operator(slab, probe.frequencies, directions, solid_angle)
-    prior = radiance_covariance(directions, directions)
-    matrix = wanted @ prior @ predictor(seen, directions)
-    missing = (wanted @ prior @ wanted.T - matrix @ (seen @ prior @ wanted.T)) / (wanted[0] @ prior @ wanted[0])
+    seen, wanted = (
+        received_operator(slab, frequencies, *sky_directions()) for frequencies in (measured, probe.frequencies)
+    )
+    matrix = wanted @ predicted_sky(slab, measured)
+    told = sky_covariance() @ wanted.T
+    missing = (wanted @ told - matrix @ (seen @ told)) / (wanted[0] @ told[:, 0])
     return Resampling(np.asarray(matrix, float), np.asarray(0.5 * (missing + missing.T), float))

@@ -5,13 +5,17 @@ radiosity harmonics B_l its radiance is T(v)/pi * sum f_a B_l exp(i (a + l) phi)
 a + l = m (paper, eqs 12-19, with real layers). Rows are real: mean, cosine 1, sine 1, ... of the film's phase.
 """
 
+import ctypes
+
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.layer_series import HARMONICS as STACK_HARMONICS
+from arlight.estimation.layer_series import real_parts
 from arlight.estimation.resampling import measured_frequencies
 from arlight.estimation.slab_echo import uniform_light
-from arlight.estimation.stack import paper_light
+from arlight.estimation.stack import PaperLight, paper_light
+from arlight.native import Workspace, library
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Block, Probe
 from arlight.tracking.block_layout import field_blocks
@@ -20,12 +24,39 @@ from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+_LANES = 4
+"""Blocks that the compiled code handles together."""
+_PARTS = 2 * STACK_HARMONICS + 1
+_native = library(__file__, "response")
+
+
+class _Response(Workspace):
+    """As in response.c."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("blocks", "stride", "columns", "unknown", "kinds", "folded")),
+        ("index", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("film", "radiosity", "gathered", "echo", "kind", "overtone")),
+        *((name, ctypes.c_void_p) for name in ("passed_twice", "shape", "phasor", "cosine")),
+        *((name, ctypes.c_void_p) for name in ("echoed", "rows", "mirror")),
+    )
+
 
 class BlockResponse:
     """The response of a sheet's blocks; everything that does not depend on the view is computed once."""
 
     places: NDArray[np.int64]
     """(blocks, c) which real-packed coefficients the columns of a block's rows belong to."""
+    sequence: NDArray[np.int64]
+    """(blocks,) the blocks in the order of the compiled tables: those without pattern, then by frequency."""
+    phasor: Array
+    """(2, stride) real and imaginary part of the views' phasors in that order, to be filled before `fill`."""
+    cosine: Array
+    """(stride,) cosines of the views, as well."""
+    rows: Array
+    """(c, 7, stride) what `fill` finds: rows for unit coefficients before blur."""
+    mirror: Array
+    """(7, stride) and the lower face's mirror reflection, where the upper face mirrors 1."""
 
     def __init__(
         self, probe: Probe, assembly: Assembly | None = None, *, bounces: bool = True, echoes: bool = True
@@ -40,19 +71,56 @@ class BlockResponse:
         """
         blocks = field_blocks(probe)
         light = paper_light(probe, blocks, assembly, bounces=bounces, echoes=echoes)
-        self._slab = (assembly or Assembly()).slab(probe)
-        self._film = _toeplitz(light.film)
-        self._echo = light.echo
+        slab = (assembly or Assembly()).slab(probe)
+        self.places, known = _places(probe, blocks, light.radiosity.shape[2])
+        self.sequence = np.argsort(self.places[:, 1], kind="stable")
+        self._count, unknown = len(blocks), 2 * len(probe.frequencies) - 1
+        self._shape = np.zeros(unknown)
         if light.echo is not None:
-            self._usual_light = uniform_light(self._slab, measured_frequencies(probe, assembly or Assembly()))
+            self._usual_shape = uniform_light(slab, measured_frequencies(probe, assembly or Assembly()))
+        else:
+            self._usual_shape = np.eye(1, unknown)[0]
+        stride = -(-len(blocks) // _LANES) * _LANES
+        self.phasor, self.cosine = np.zeros((2, stride)), np.ones(stride)
+        self.rows, self.mirror = np.zeros((self.places.shape[1], ROWS, stride)), np.zeros((ROWS, stride))
+        self._native = _Response(
+            blocks=stride, stride=stride, columns=self.places.shape[1], unknown=unknown, index=slab.refractive_index
+        )
+        self._native.hold({
+            "shape": self._shape, "phasor": self.phasor, "cosine": self.cosine, "rows": self.rows,
+            "mirror": self.mirror, "overtone": self._overtone(stride),
+        })  # fmt: skip
+        self._hold(light, known, stride)
+
+    def _hold(self, light: PaperLight, known: NDArray[np.bool_], stride: int) -> None:
+        """Keep what the view does not change as the compiled code wants it: one plane a number, real parts alone."""
+        film = real_parts(light.film)
         # share of the light that the film's second crossing leaves on its way out
-        self._passed_twice = np.einsum("bl,bl->b", light.film, np.conj(light.film)).real
-        # (blocks, m, l, c): film harmonic m - l times radiosity harmonic l
-        self._paths = self._film[..., None] * light.radiosity[:, None]
-        self.places, known = _places(probe, blocks, self._paths.shape[3])
-        self._paths *= known[:, None, None, :]
-        # the lower face mirrors through the film twice, 2 D(v) apart: film harmonics m - l and l, turned by 2 l b
-        self._mirror = self._film * light.film[:, None]
+        passed_twice = film[:, 0] ** 2 + 2.0 * np.sum(film[:, 1:] ** 2, axis=1)
+        radiosity = np.moveaxis(real_parts(np.moveaxis(light.radiosity, 2, 1)) * known[:, :, None], 0, 2)
+        tables = {"film": film.T, "radiosity": radiosity, "passed_twice": passed_twice}
+        kind = np.zeros(stride, np.int32)
+        self._native.kinds = 0
+        if light.echo is not None:
+            self._native.kinds = len(light.echo.irradiance)
+            kind[: self._count] = light.echo.kind[self.sequence]
+            tables["gathered"] = np.moveaxis(_real_matrix(light.gathered), 0, 2)
+            echo = np.ascontiguousarray(np.swapaxes(real_parts(np.swapaxes(light.echo.irradiance, 1, 2)), 1, 2))
+            self._native.hold({"echo": echo, "echoed": np.zeros((len(echo), _PARTS))})
+        self._native.hold({"kind": kind, **{name: self._planes(table, stride) for name, table in tables.items()}})
+
+    def _planes(self, table: Array, stride: int) -> Array:
+        """A table (..., blocks) in the compiled order, with room for whole lanes."""
+        planes = np.zeros((*table.shape[:-1], stride))
+        planes[..., : self._count] = table[..., self.sequence]
+        return planes
+
+    def _overtone(self, stride: int) -> NDArray[np.int32]:
+        """(stride,) place of Re L_2n; 0 where it is not listened to."""
+        overtone = np.zeros(stride, np.int32)
+        if self.places.shape[1] > 3:
+            overtone[: self._count] = self.places[self.sequence, 3]
+        return overtone
 
     def light(self, means: BlockMeans, shape: Array | None = None) -> Array:
         """Rows (blocks, 7, c) for unit coefficients before blur.
@@ -65,31 +133,50 @@ class BlockResponse:
             shape: (2k - 1,) real-packed coefficients relative to L_0, as far as known, for what the light near the
                 horizon does inside the glass; a uniform sky's by default.
         """
-        turn = view_powers(means.view_phasor, 1)
-        series = np.einsum("bmlk,bl->bmk", self._paths, turn)
-        if self._echo is not None:
-            echo = self._echo @ (self._usual_light if shape is None else shape)
-            series[:, :, 0] += np.einsum("bml,bl->bm", self._film, echo * turn)
-        return _real_rows(series) * (self._leaving(means.view_cosine) / np.pi)[:, None, None]
-
-    def _leaving(self, view_cosine: Array) -> Array:
-        """(blocks,) share of the paper's light that leaves toward the viewer, beside the film's first crossing.
-
-        What the upper face sends back crosses the film twice more before it leaves 2 D(v) further on; that small part
-        counts with the film's mean square.
-        """
-        transmittance = self._slab.transmittance(view_cosine)
-        if self._echo is None:
-            return np.asarray(transmittance, float)
-        twice = self._slab.interface_reflectance(view_cosine) ** 2
-        return np.asarray(transmittance * (1.0 - twice) / (1.0 - twice * self._passed_twice), float)
+        self._look(means)
+        self.fill(self._count, shape, folded=False)
+        return np.moveaxis(self._natural(self.rows), 2, 0).swapaxes(1, 2).copy()
 
     def lower_mirror(self, means: BlockMeans) -> Array:
         """Rows (blocks, 7) of the mirror reflection in the glass's lower face, where the upper face's is 1."""
-        turn = view_powers(means.view_phasor, 2)
-        series = np.einsum("bml,bl->bm", self._mirror, turn)
-        passed = (1.0 - self._slab.interface_reflectance(means.view_cosine)) ** 2
-        return _real_rows(series[..., None])[..., 0] * passed[:, None]
+        self._look(means)
+        _native.mirror_rows(ctypes.byref(self._native))
+        return self._natural(self.mirror).T.copy()
+
+    def fill(self, count: int, shape: Array | None = None, *, folded: bool = True) -> None:
+        """Compute `rows` and `mirror` for the first `count` blocks of the sequence, seen as `phasor` and `cosine` say.
+
+        Args:
+            shape: as for `light`.
+            folded: count light of twice a block's frequency with that of L_0, by the shape; of `rows` only the first
+                three columns are filled then.
+        """
+        self._shape[:] = self._usual_shape if shape is None else shape
+        self._native.blocks, self._native.folded = count, folded
+        _native.light_rows(ctypes.byref(self._native))
+        _native.mirror_rows(ctypes.byref(self._native))
+
+    def _look(self, means: BlockMeans) -> None:
+        phasor = np.asarray(means.view_phasor)[self.sequence]
+        self.phasor[:, : self._count] = phasor.real, phasor.imag
+        self.cosine[: self._count] = np.asarray(means.view_cosine)[self.sequence]
+
+    def _natural(self, planes: Array) -> Array:
+        """(..., blocks) in the sheet's own order."""
+        result = np.empty((*planes.shape[:-1], self._count))
+        result[..., self.sequence] = planes[..., : self._count]
+        return result
+
+
+def _real_matrix(matrix: ComplexArray) -> Array:
+    """(blocks, 2 H + 1, 2 H + 1) matrices of series -H..H as they act on real parts."""
+    # column by column: the series whose real parts are a unit vector
+    unit = np.zeros((_PARTS, _PARTS), complex)
+    unit[STACK_HARMONICS, 0] = 1.0
+    for m in range(1, STACK_HARMONICS + 1):
+        for sign in (1, -1):
+            unit[STACK_HARMONICS + sign * m, 2 * m - 1 : 2 * m + 1] = 1.0, 1j * sign
+    return np.swapaxes(real_parts(np.swapaxes(matrix @ unit, 1, 2)), 1, 2)
 
 
 def _places(probe: Probe, blocks: tuple[Block, ...], columns: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -108,17 +195,6 @@ def _places(probe: Probe, blocks: tuple[Block, ...], columns: int) -> tuple[NDAr
     return places, known
 
 
-def view_powers(phasor: ComplexArray, step: int) -> ComplexArray:
-    """Means of exp(-i step l b) for l = -H..H, from the mean phasor of b over a block.
-
-    The spread of b over a block is small and nearly uniform, so its characteristic function falls as that of any narrow
-    distribution: |mean exp(-i k b)| = |mean exp(-i b)|^(k^2).
-    """
-    power = step * np.arange(-STACK_HARMONICS, STACK_HARMONICS + 1)
-    length = np.maximum(np.abs(phasor), 1e-6)
-    return length[:, None] ** (power**2) * np.exp(1j * np.outer(np.angle(phasor), power))
-
-
 def optical_transfer(cycles_per_px: Array, blur_variance_px2: float) -> Array:
     """What pixel and blur leave of each row (blocks, 7): 1 for the mean, the transfer at m n for harmonic m.
 
@@ -130,19 +206,3 @@ def optical_transfer(cycles_per_px: Array, blur_variance_px2: float) -> Array:
     frequency = harmonic[:, None] * cycles_per_px[:, None, :]
     square = np.prod(np.sinc(frequency), axis=-1)
     return square * np.exp(-2.0 * np.pi**2 * blur_variance_px2 * np.sum(frequency**2, axis=-1))
-
-
-def _toeplitz(film: ComplexArray) -> ComplexArray:
-    """(blocks, m, l): film harmonic m - l for m = 0..3, l = -H..H."""
-    size = film.shape[1]
-    index = np.subtract.outer(np.arange(HARMONICS + 1), np.arange(size)) + 2 * STACK_HARMONICS
-    return np.where((index >= 0) & (index < size), film[:, np.clip(index, 0, size - 1)], 0.0)
-
-
-def _real_rows(series: ComplexArray) -> Array:
-    """Mean, cosine and sine rows (blocks, 7, k) of harmonics (blocks, 4, k) of a real function."""
-    rows = np.empty((series.shape[0], ROWS, series.shape[2]))
-    rows[:, 0] = series[:, 0].real
-    rows[:, 1::2] = 2.0 * series[:, 1:].real
-    rows[:, 2::2] = -2.0 * series[:, 1:].imag
-    return rows

@@ -10,40 +10,46 @@ the last count with the film's mean over the sheet. The coefficients alone do no
 is small and linear, so it is predicted from them under the prior of natural light.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.layer_series import HARMONICS, convolution
-from arlight.estimation.radiance_prior import hemisphere_points, predictor, radiance_covariance, received_operator
+from arlight.estimation.radiance_prior import predicted_sky, received_operator, sky_directions
 from arlight.optics import Slab
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_DIRECTIONS = 1024
-
 
 def uniform_light(slab: Slab, frequencies: Array) -> Array:
     """(2k - 1,) real-packed coefficients of a uniform sky at frequencies (k, 2), relative to its L~_0."""
-    directions, solid_angle = _directions()
+    directions, solid_angle = sky_directions()
     packed = received_operator(slab, frequencies, directions, solid_angle).sum(axis=1)
     return np.asarray(packed / packed[0], float)
 
 
-def echo_irradiance(film: ComplexArray, cycles: Array, slab: Slab, frequencies: Array) -> ComplexArray:
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """What the round trips change in the irradiance of the paper; many blocks share it."""
+
+    irradiance: ComplexArray
+    """(kinds, 2 H + 1, 2k - 1): harmonics -H..H beyond T times the film's shadow, for unit real-packed coefficients."""
+    kind: NDArray[np.int64]
+    """(blocks,) which of them is each block's."""
+
+
+def echo_irradiance(film: ComplexArray, cycles: Array, slab: Slab, frequencies: Array) -> Echo:
     """What the round trips change in the irradiance of the paper, per unit coefficient.
 
     Args:
         film: (blocks, 2 H + 1) harmonics of each block's film.
         cycles: (blocks, 2) frequency of its stripes in the light plane.
         frequencies: (k, 2) frequencies of the coefficients.
-
-    Returns:
-        (blocks, 2 H + 1, 2k - 1): harmonics -H..H of the irradiance beyond T times the film's shadow.
     """
-    directions, solid_angle = _directions()
-    operator = received_operator(slab, frequencies, directions, solid_angle)
-    radiance = radiance_covariance(directions, directions) @ predictor(operator, directions)
+    directions, solid_angle = sky_directions()
+    radiance = predicted_sky(slab, frequencies)
     cosine = directions[:, 2]
     received = radiance * (solid_angle * cosine * slab.transmittance(cosine))[:, None]
     twice = slab.interface_reflectance(cosine) ** 2
@@ -53,14 +59,10 @@ def echo_irradiance(film: ComplexArray, cycles: Array, slab: Slab, frequencies: 
     # blocks share few frequencies and films: the phases of the paper do not matter here
     key = np.round(np.concatenate([film.real, film.imag, cycles], axis=1), 9)
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    harmonics = np.arange(-HARMONICS, HARMONICS + 1)
-    change = np.empty((len(first), len(harmonics), received.shape[1]), complex)
-    for place, block in enumerate(first):
-        wave = np.exp(2j * np.pi * np.outer(harmonics, slab.light_plane(directions) @ cycles[block]))
-        kernel = film[block][:, None] * straight + squared[block][:, None] * echoed
-        change[place] = (kernel * wave) @ received
-    return change[group.ravel()]
-
-
-def _directions() -> tuple[Array, Array]:
-    return hemisphere_points(_DIRECTIONS), np.full(_DIRECTIONS, 2.0 * np.pi / _DIRECTIONS)
+    kernel = film[first][:, :, None] * straight + squared[first][:, :, None] * echoed
+    phase = 2.0 * np.pi * np.multiply.outer(cycles[first] @ slab.light_plane(directions).T, np.arange(HARMONICS + 1))
+    upper = kernel[:, HARMONICS:] * np.exp(1j * np.swapaxes(phase, 1, 2))
+    # of a real function the other harmonics are the conjugates
+    change = upper.real @ received + 1j * (upper.imag @ received)
+    change = np.concatenate([np.conj(change[:, :0:-1]), change], axis=1)
+    return Echo(change, group.ravel())

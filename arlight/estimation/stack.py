@@ -22,7 +22,7 @@ from arlight.estimation.layer_series import (
     turned,
 )
 from arlight.estimation.resampling import measured_frequencies
-from arlight.estimation.slab_echo import echo_irradiance
+from arlight.estimation.slab_echo import Echo, echo_irradiance
 from arlight.optics import Slab
 from arlight.probe.assembly import Assembly, BlockCorrections
 from arlight.probe.design import Block, Probe
@@ -47,9 +47,10 @@ class PaperLight:
     """(blocks, 2 H + 1, 3 or 5): harmonics -H..H of the paper's radiosity for unit coefficients."""
     film: ComplexArray
     """(blocks, 2 H + 1): harmonics -H..H of the film's transmittance."""
-    echo: ComplexArray | None
-    """(blocks, 2 H + 1, 2k - 1): radiosity from light that went back and forth in the glass, beyond what T counts, for
-    unit real-packed coefficients; None without bounces."""
+    gathered: ComplexArray
+    """(blocks, 2 H + 1, 2 H + 1): radiosity for unit harmonics of the irradiance that enters."""
+    echo: Echo | None
+    """Irradiance from light that went back and forth in the glass, beyond what T counts; None without bounces."""
 
 
 def paper_light(
@@ -87,10 +88,10 @@ def paper_light(
     cycles = film_cycles * slab.period_mm
     reflect = convolution(paper)
     if not bounces:
-        return PaperLight(np.asarray(reflect @ _entering(film), complex), film, None)
+        return PaperLight(np.asarray(reflect @ _entering(film), complex), film, reflect, None)
     gathered = _gathered(film, reflect, np.hypot(*cycles.T), slab)
     echo = echo_irradiance(film, cycles, slab, measured_frequencies(probe, assembly)) if echoes else None
-    return PaperLight(gathered @ _entering(film), film, None if echo is None else gathered @ echo)
+    return PaperLight(gathered @ _entering(film), film, gathered, echo)
 
 
 def _paper_lead(assembly: Assembly, blocks: tuple[Block, ...], film_cycles: Array, paper_cycles: Array) -> Array:

@@ -13,6 +13,8 @@ _FLAGS = [
     *["-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-O3"],
     # sums may be reordered and nothing asks for errno or traps; infinities and nan stay what they are
     *["-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-ffp-contract=fast"],
+    # vectors are passed between functions that are inlined, where no convention counts
+    "-Wno-psabi",
 ]
 
 

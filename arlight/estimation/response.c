@@ -1,0 +1,192 @@
+/* Rows that blocks show for unit light, from one point of view: products of short Fourier series, block by block.
+
+A real function has harmonics 0 to 4 as a mean and four complex numbers; those of -l are the conjugates. */
+#include "lanes.h"
+
+#define TOP 4                     /* highest harmonic of a layer that is followed */
+#define PARTS (2 * TOP + 1)       /* real numbers of a series: mean, then real and imaginary parts */
+#define SEEN 3                    /* highest harmonic of the rows */
+#define ROWS (2 * SEEN + 1)
+
+typedef struct {
+    int64_t blocks;             /* that are asked for, the first ones; planes are filled to whole lanes */
+    int64_t stride;             /* length of a plane */
+    int64_t columns;            /* 3, or 5 where the film has a second harmonic */
+    int64_t unknown;            /* 2k - 1 real coefficients of the light */
+    int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0: no such light */
+    int64_t folded;             /* whether light of twice the frequency is counted with that of L_0, by the shape */
+    double index;               /* of refraction */
+    const double *film;         /* (9, stride) series of the transmittance */
+    const double *radiosity;    /* (columns, 9, stride) series of the paper's radiosity for unit coefficients */
+    const double *gathered;     /* (9, 9, stride) radiosity for unit irradiance, part by part */
+    const double *echo;         /* (kinds, 9, unknown) irradiance from light that went back and forth */
+    const int32_t *kind;        /* (stride) of each block */
+    const int32_t *overtone;    /* (stride) place of Re L_2n; 0 for none */
+    const double *passed_twice; /* (stride) share of the light that a second crossing of the film leaves */
+    const double *shape;        /* (unknown) coefficients relative to L_0, as far as known */
+    const double *phasor;       /* (2, stride) mean of exp(-i b) over the view */
+    const double *cosine;       /* (stride) of the angle between viewer and normal */
+    double *echoed;             /* (kinds, 9) irradiance for the shape */
+    double *rows;               /* (columns, 7, stride) result */
+    double *mirror;             /* (7, stride) result: of the lower face where the upper face mirrors 1 */
+} Response;
+
+/* Four blocks' real functions. */
+typedef struct {
+    lanes mean, real[TOP + 1], imaginary[TOP + 1]; /* place 0 of the arrays is not used */
+} Series;
+
+INLINE Series series_at(const double *planes, int64_t stride, int64_t block)
+{
+    Series s = {.mean = load(planes + block)};
+    for (int l = 1; l <= TOP; l++) {
+        s.real[l] = load(planes + (2 * l - 1) * stride + block);
+        s.imaginary[l] = load(planes + 2 * l * stride + block);
+    }
+    return s;
+}
+
+/* Powers exp(-i l step b), averaged over a narrow spread of b: their lengths fall as that of the first to the l^2. */
+INLINE Series view_powers(const Response *r, int64_t block, int step)
+{
+    lanes x = load(r->phasor + block), y = load(r->phasor + r->stride + block);
+    lanes length = root(x * x + y * y);
+    lane_bits none = length == 0.0;
+    x = select_lanes(none, splat(1.0), x / length);
+    y = select_lanes(none, splat(0.0), y / length);
+    length = larger(length, splat(1e-6));
+    if (step == 2) {
+        lanes double_x = x * x - y * y, square = length * length;
+        y = 2.0 * x * y;
+        x = double_x;
+        length = square * square;
+    }
+    Series p = {.mean = splat(1.0)};
+    lanes turn_x = x, turn_y = y, shrink = length, step_down = length * length * length, square = length * length;
+    for (int l = 1; l <= TOP; l++) {
+        p.real[l] = turn_x * shrink;
+        p.imaginary[l] = turn_y * shrink;
+        lanes next = turn_x * x - turn_y * y;
+        turn_y = turn_x * y + turn_y * x;
+        turn_x = next;
+        shrink *= step_down;
+        step_down *= square;
+    }
+    return p;
+}
+
+INLINE Series turned(Series s, Series turn)
+{
+    for (int l = 1; l <= TOP; l++) {
+        lanes real = s.real[l] * turn.real[l] - s.imaginary[l] * turn.imaginary[l];
+        s.imaginary[l] = s.real[l] * turn.imaginary[l] + s.imaginary[l] * turn.real[l];
+        s.real[l] = real;
+    }
+    return s;
+}
+
+/* Mean, cosine and sine rows of the product of two functions, written to `to` with one plane a row. */
+INLINE void write_product(const Series *f, const Series *q, lanes factor, double *to, int64_t stride)
+{
+    lanes mean = 0.5 * f->mean * q->mean;
+    for (int l = 1; l <= TOP; l++)
+        mean += f->real[l] * q->real[l] + f->imaginary[l] * q->imaginary[l];
+    factor *= 2.0;
+    store(to, mean * factor);
+    for (int m = 1; m <= SEEN; m++) {
+        lanes real = f->real[m] * q->mean + f->mean * q->real[m];
+        lanes imaginary = f->imaginary[m] * q->mean + f->mean * q->imaginary[m];
+        for (int l = 1; l < m; l++) {
+            real += f->real[m - l] * q->real[l] - f->imaginary[m - l] * q->imaginary[l];
+            imaginary += f->real[m - l] * q->imaginary[l] + f->imaginary[m - l] * q->real[l];
+        }
+        for (int l = 1; l <= TOP - m; l++) {
+            /* harmonics m + l of one and -l of the other */
+            real += f->real[m + l] * q->real[l] + f->imaginary[m + l] * q->imaginary[l];
+            real += f->real[l] * q->real[m + l] + f->imaginary[l] * q->imaginary[m + l];
+            imaginary += f->imaginary[m + l] * q->real[l] - f->real[m + l] * q->imaginary[l];
+            imaginary += f->real[l] * q->imaginary[m + l] - f->imaginary[l] * q->real[m + l];
+        }
+        store(to + (2 * m - 1) * stride, real * factor);
+        store(to + 2 * m * stride, -imaginary * factor);
+    }
+}
+
+/* Reflectance of one face of the glass (Fresnel, unpolarised). */
+INLINE lanes face_reflectance(lanes cosine, double index)
+{
+    lanes air = larger(smaller(cosine, splat(1.0)), splat(0.0));
+    lanes glass = root(1.0 - (1.0 - air * air) / (index * index));
+    lanes s = (air - index * glass) / (air + index * glass), p = (index * air - glass) / (index * air + glass);
+    return 0.5 * (s * s + p * p);
+}
+
+/* Radiosity for L_0 = 1, with what the rest of the light's shape adds to it. */
+INLINE Series lit(const Response *r, int64_t block)
+{
+    Series s = series_at(r->radiosity, r->stride, block);
+    lanes irradiance[PARTS];
+    for (int j = 0; j < PARTS && r->kinds; j++)
+        for (int k = 0; k < LANES; k++)
+            irradiance[j][k] = r->echoed[r->kind[block + k] * PARTS + j];
+    lanes added[PARTS];
+    for (int i = 0; i < PARTS; i++) {
+        added[i] = splat(0.0);
+        for (int j = 0; j < PARTS && r->kinds; j++)
+            added[i] += load(r->gathered + (i * PARTS + j) * r->stride + block) * irradiance[j];
+    }
+    for (int k = 3; k < r->columns && r->folded; k++) {
+        lanes share;
+        for (int i = 0; i < LANES; i++)
+            share[i] = r->overtone[block + i] ? r->shape[r->overtone[block + i] + k - 3] : 0.0;
+        for (int i = 0; i < PARTS; i++)
+            added[i] += share * load(r->radiosity + (k * PARTS + i) * r->stride + block);
+    }
+    s.mean += added[0];
+    for (int l = 1; l <= TOP; l++) {
+        s.real[l] += added[2 * l - 1];
+        s.imaginary[l] += added[2 * l];
+    }
+    return s;
+}
+
+static HOT void echo_of_shape(const Response *r)
+{
+    for (int64_t i = 0; i < r->kinds * PARTS; i++) {
+        double sum = 0.0;
+        for (int64_t k = 0; k < r->unknown; k++)
+            sum += r->echo[i * r->unknown + k] * r->shape[k];
+        r->echoed[i] = sum;
+    }
+}
+
+/* Fills `rows`. */
+EXPORT HOT void light_rows(const Response *r)
+{
+    echo_of_shape(r);
+    int64_t columns = r->folded ? 3 : r->columns;
+    for (int64_t b = 0; b < r->blocks; b += LANES) {
+        Series film = series_at(r->film, r->stride, b), turn = view_powers(r, b, 1);
+        lanes face = face_reflectance(load(r->cosine + b), r->index), twice = face * face;
+        lanes leaving = (1.0 - face) / ((1.0 + face) * PI);
+        /* what the upper face sends back crosses the film twice more before it leaves */
+        if (r->kinds)
+            leaving *= (1.0 - twice) / (1.0 - twice * load(r->passed_twice + b));
+        for (int64_t k = 0; k < columns; k++) {
+            Series light = k ? series_at(r->radiosity + k * PARTS * r->stride, r->stride, b) : lit(r, b);
+            light = turned(light, turn);
+            write_product(&film, &light, leaving, r->rows + k * ROWS * r->stride + b, r->stride);
+        }
+    }
+}
+
+/* Fills `mirror`: the lower face mirrors through the film twice, 2 D(v) apart. */
+EXPORT HOT void mirror_rows(const Response *r)
+{
+    for (int64_t b = 0; b < r->blocks; b += LANES) {
+        Series film = series_at(r->film, r->stride, b);
+        Series image = turned(film, view_powers(r, b, 2));
+        lanes passed = 1.0 - face_reflectance(load(r->cosine + b), r->index);
+        write_product(&film, &image, passed * passed, r->mirror + b, r->stride);
+    }
+}
