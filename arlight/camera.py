@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.errors import CameraError
+from arlight.pixel_grid import over_pixels
 from arlight.radiometry import Radiometry
 
 Array = NDArray[np.float64]
@@ -125,10 +126,7 @@ class Camera:
     @cached_property
     def ray_map(self) -> NDArray[np.float32]:
         """(h, w, 2) undistorted normalised coordinates of every pixel's centre; computed once."""
-        width, height = self.image_size
-        x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
-        rays = self.rays(np.stack([x, y], axis=-1).reshape(-1, 2))
-        return rays.reshape(height, width, 2).astype(np.float32)
+        return over_pixels(self.rays, self.image_size)
 
 
 @dataclass(frozen=True)
