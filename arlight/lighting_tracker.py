@@ -20,7 +20,7 @@ from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.block_means import BlockMeans
 from arlight.tracking.blocks import BlockMeter
-from arlight.tracking.luma import luma_codes
+from arlight.tracking.luma import luma_plane
 from arlight.tracking.pose import ProbePose
 from arlight.tracking.tracker import PoseTracker
 from arlight.video.frame import Frame
@@ -38,6 +38,8 @@ class TrackerSettings:
 
     samples_per_block: int = 1200
     """Pixels a block is sampled with at most."""
+    alignment_levels: int = 1
+    """Levels of resolution that the pose is aligned on, 1 to 4; coarser ones are always there to fall back on."""
     filtered: bool = True
     """Average over time; without it every frame stands alone."""
     bounces: bool = True
@@ -104,7 +106,7 @@ class LightingTracker:
         if self._settings.order is not None:
             orders_up_to(probe.frequencies, self._settings.order)
         self._radiometry = camera.radiometry
-        self._tracker = PoseTracker(probe, camera)
+        self._tracker = PoseTracker(probe, camera, self._settings.alignment_levels)
         self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
         self._estimator = estimator or LightingEstimator(probe, assembly, bounces=self._settings.bounces)
         self._filter = LightingFilter()
@@ -130,7 +132,7 @@ class LightingTracker:
 
     def _update(self, frame: Frame) -> FrameEstimate:
         start = self._clock()
-        codes, table = luma_codes(frame, self._radiometry)
+        codes, table = luma_plane(frame, self._radiometry)
         pose = self._tracker.update(codes, frame.time_s, table)
         tracked = self._clock()
         estimate, measured = self._estimate(frame, pose)

@@ -1,162 +1,184 @@
-"""Compiled: the normal equations of the alignment.
+"""The compiled alignment (alignment.c) and the memory that it shares with Python."""
 
-Plain loops over plain arrays, without linear algebra calls, so that a cold compilation stays short.
-
-Feature vector of a point, in this order: [T, u T, v T, 1 | 6 pose derivatives | I], with T the template (0 black,
-1 white), I the picture in linear light. The first four absorb a marker's lighting: gain, its slope, and bias.
-"""
-
-import math
+import ctypes
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from arlight.tracking.lens import project
+from arlight.camera import Camera, Pose
+from arlight.native import Workspace, library
+from arlight.probe.design import Probe
+from arlight.tracking.lens import camera_parameters
+from arlight.tracking.template import FiducialTemplate
 
-LIGHTING = 4
-POSE = 6
-FEATURES = LIGHTING + POSE + 1
-SMALLEST_VARIANCE = 4e-4
-"""Residual variance, relative to the gain's square, that no marker is trusted beyond: 2 % of the contrast."""
+Array = NDArray[np.float64]
+Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
-
-@njit(cache=True, error_model="numpy")
-def sample(codes, table, x, y):
-    """Linear light between four pixels; -1 outside the picture."""
-    height, width = codes.shape
-    if not (x >= 0.0 and y >= 0.0 and x <= width - 1 and y <= height - 1):
-        return -1.0
-    i, j = min(int(x), width - 2), min(int(y), height - 2)
-    a, b = x - i, y - j
-    top = table[codes[j, i]] * (1.0 - a) + table[codes[j, i + 1]] * a
-    bottom = table[codes[j + 1, i]] * (1.0 - a) + table[codes[j + 1, i + 1]] * a
-    return top * (1.0 - b) + bottom * b
+LIGHTING, FEATURES = 4, 12
+"""Features of a point: a marker's lighting, pose derivatives (rotation, translation), blur, and light in the last."""
+LIGHT = FEATURES - 1
 
 
-@njit(cache=True, error_model="numpy")
-def observe(codes, table, window, camera, pose, place, size, points, values, f):
-    """Features of one marker's points, a column each; -1 in the last row where a point is outside the picture.
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A frame's luma as the alignment reads it."""
+
+    luma: Codes
+    """(h, w) luma codes."""
+    table: NDArray[np.float32]
+    """(2^bits,) linear light of a code."""
+
+    def eight_bits(self) -> NDArray[np.uint8]:
+        """The codes of 8 bits, as OpenCV wants them."""
+        if self.luma.dtype == np.uint8:
+            return self.luma.view(np.uint8)
+        surplus = max(len(self.table).bit_length() - 9, 0)
+        return (self.luma >> surplus).astype(np.uint8)
+
+
+class _Shared(Workspace):
+    """`Alignment` of alignment.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("markers", "points", "size", "positions")),
+        *((name, ctypes.c_void_p) for name in ("camera", "outline")),
+        ("radius_mm", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("places", "black", "base", "spread", "index_u", "index_v", "drawn")),
+        *((name, ctypes.c_void_p) for name in ("at", "slope", "features", "scratch", "shrunk", "coefficients")),
+        *((name, ctypes.c_void_p) for name in ("gram", "correlation", "weight", "pose", "result", "codes", "table")),
+        *((name, ctypes.c_int64) for name in ("stride", "code_bytes", "width", "height", "entries")),
+    )
+
+
+class AlignmentKernels:
+    """Compiled alignment of one sheet's markers, with its memory.
 
     Args:
-        codes, table, window: luma codes, their linear light, and x0, y0, scale of `codes` in the frame.
-        camera, pose: as in `project`; rotation row by row, translation.
-        place: origin, one module to the right, one module down (x, y each) on the sheet [mm].
-        size: modules on a side.
-        points, values: as `render` leaves them.
-        f: (11, p) the features.
+        probe: the sheet.
+        camera: intrinsics of the camera, lens distortion included.
 
-    The pose derivatives (rotation about the sheet's origin, translation) are taken on the plane, where lens distortion
-    cancels: dT/dpose = dT/d(u, v) (dx/d(u, v))^-1 dx/dpose with x the undistorted image.
+    Raises:
+        ProbeError: the sheet has no fiducials that ArUco knows.
+        InstallationError: the compiled part is missing.
     """
-    step = np.empty(6)
-    for k in range(3):
-        step[k] = pose[3 * k] * place[2] + pose[3 * k + 1] * place[3]
-        step[3 + k] = pose[3 * k] * place[4] + pose[3 * k + 1] * place[5]
-    for p in range(f.shape[1]):
-        u, v = points[0, p], points[1, p]
-        t, tu, tv = values[0, p], values[1, p], values[2, p]
-        x_mm = place[0] + u * place[2] + v * place[4]
-        y_mm = place[1] + u * place[3] + v * place[5]
-        qx, qy, qz = pose[0] * x_mm + pose[1] * y_mm, pose[3] * x_mm + pose[4] * y_mm, pose[6] * x_mm + pose[7] * y_mm
-        z = max(qz + pose[11], 1e-6)
-        x, y = (qx + pose[9]) / z, (qy + pose[10]) / z
-        xu, yu, xv, yv = step[0] - x * step[2], step[1] - y * step[2], step[3] - x * step[5], step[4] - y * step[5]
-        determinant = xu * yv - xv * yu
-        a, b = (tu * yv - tv * yu) / determinant, (tv * xu - tu * xv) / determinant
-        c = -(a * x + b * y)
-        f[0, p], f[1, p], f[2, p], f[3, p] = t, t * (2.0 * u / size - 1.0), t * (2.0 * v / size - 1.0), 1.0
-        f[4, p], f[5, p], f[6, p] = qy * c - qz * b, qz * a - qx * c, qx * b - qy * a
-        f[7, p], f[8, p], f[9, p] = a, b, c
-        x, y = project(camera, x, y)
-        f[10, p] = sample(
-            codes, table, (x - window[0] + 0.5) * window[2] - 0.5, (y - window[1] + 0.5) * window[2] - 0.5
+
+    def __init__(self, probe: Probe, camera: Camera) -> None:
+        template = FiducialTemplate.of_probe(probe)
+        m, p = template.index_u.shape
+        size, positions = template.size, len(template.position_base)
+        self.places = template.places.copy()
+        """(m, 6) top left corner, one module to the right, one module down, x and y each, probe frame [mm]."""
+        self.at, self.slope = np.zeros((m, 2, p), np.float32), np.zeros((m, 2, p), np.float32)
+        """(m, 2, p) u and v of the points, and the template's derivatives there [modules]."""
+        self.features = np.zeros((m, FEATURES, p), np.float32)
+        """(m, 12, p) of the points, as alignment.h lists them."""
+        self.coefficients, self.gram = np.zeros((m, LIGHTING)), np.zeros((m, FEATURES, FEATURES))
+        """(m, 4) each marker's gain, its slopes and bias, (m, 12, 12) products of features, the lighting eliminated,
+        upper triangle."""
+        self.correlation, self.weight = np.zeros(m), np.zeros(m)
+        """(m,) of each marker with its picture, and in the pose's equations: 0 is left out."""
+        self.pose, self.result = np.zeros(12), np.zeros(3)
+        """(12,) rotation row by row and translation, and (3,) residual rms, corners' standard deviation, blur [px]."""
+        corners = np.array([marker.corners_mm for marker in probe.markers], float)
+        width, height = camera.image_size
+        grid = 2 * positions + 7 * (size + 1) * positions + positions**2
+        self._drawn = np.zeros((m, 4))
+        self._shared = _Shared(m, p, size, positions, radius_mm=float(np.linalg.norm(corners, axis=2).max()))
+        self._shared.hold(
+            {
+                "camera": camera_parameters(camera),
+                "outline": np.ascontiguousarray(probe.outline_mm, float),
+                "places": self.places,
+                "black": template.black.astype(np.float32),
+                "base": template.position_base.astype(np.float32),
+                "spread": template.position_spread.astype(np.float32),
+                "index_u": template.index_u.astype(np.int32),
+                "index_v": template.index_v.astype(np.int32),
+                "drawn": self._drawn,
+                "at": self.at,
+                "slope": self.slope,
+                "features": self.features,
+                "scratch": np.empty(max(2 * p, grid), np.float32),
+                "shrunk": np.empty((height // 2 + 1, width // 2 + 1), np.float32),
+                "coefficients": self.coefficients,
+                "gram": self.gram,
+                "correlation": self.correlation,
+                "weight": self.weight,
+                "pose": self.pose,
+                "result": self.result,
+            }
         )
+        self._at = ctypes.byref(self._shared)
+        self._size = (height, width)
+        self._align, self._draw, self._observe = _functions()
+
+    def reset(self) -> None:
+        """Draw the templates anew: without it, one drawn for nearly the same blur is kept."""
+        self._drawn[:] = 0.0
+
+    def show(self, picture: Picture) -> None:
+        """Look at a picture from now on; it must outlive the calls.
+
+        Raises:
+            ValueError: not of the camera's size, or the table does not fit the codes.
+        """
+        table, shared = picture.table, self._shared
+        luma: NDArray[np.generic] = picture.luma
+        if luma.shape != self._size or luma.dtype not in (np.uint8, np.uint16):
+            raise ValueError(f"luma must be uint8 or uint16 {self._size}, found {luma.dtype} {luma.shape}")
+        if luma.strides[1] != luma.itemsize:
+            luma = np.ascontiguousarray(luma)
+        if table.dtype != np.float32 or not table.flags.c_contiguous or (luma.itemsize == 1 and len(table) < 256):
+            raise ValueError(f"table must be float32, contiguous, with an entry for each code; found {table.dtype}")
+        self._picture = luma, table
+        shared.codes, shared.table = luma.ctypes.data, table.ctypes.data
+        shared.stride, shared.code_bytes = luma.strides[0], luma.itemsize
+        shared.height, shared.width = luma.shape
+        shared.entries = len(table)
+
+    def align(self, start: Pose, blur_px: float, coarsest: int) -> bool:
+        """Align to the picture shown; pose, result and what the markers say are left in the arrays.
+
+        Args:
+            start: first guess.
+            blur_px: standard deviation of the whole blur in the picture [px].
+            coarsest: the first level shrinks the picture by this power of two.
+
+        Returns:
+            Whether there is a result.
+        """
+        self._place(start)
+        return bool(self._align(self._at, blur_px, coarsest))
+
+    @property
+    def aligned(self) -> Pose:
+        """camera_from_probe that `align` found."""
+        pose = self.pose.copy()
+        return Pose(pose[:9].reshape(3, 3), pose[9:])
+
+    def draw(self, pose: Pose, blur_px: float) -> None:
+        """Draw the templates as they look at a pose, blurred by a standard deviation [px]."""
+        self._place(pose)
+        self._draw(self._at, blur_px)
+
+    def observe(self, pose: Pose, floor: float) -> int:
+        """The markers' own equations at a pose, as drawn; how many correlate better than `floor` and take part."""
+        self._place(pose)
+        return int(self._observe(self._at, floor))
+
+    def _place(self, pose: Pose) -> None:
+        self.pose[:9] = pose.rotation.ravel()
+        self.pose[9:] = pose.translation
 
 
-@njit(cache=True, error_model="numpy")
-def weigh(f, coefficients, limit, weights):
-    """Weights of points against outliers, 0 outside the picture; the number inside and the correlation of T with I.
-
-    coefficients: the marker's lighting in the step before, 0 when there is none. limit: residuals above it, relative to
-    the gain, lose weight.
-    """
-    bound = limit * coefficients[0]
-    n, st, si, stt, sii, sti = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for p in range(f.shape[1]):
-        t, light = f[0, p], f[10, p]
-        inside = 1.0 if light >= 0.0 else 0.0
-        residual = light - coefficients[0] * t - coefficients[1] * f[1, p] - coefficients[2] * f[2, p] - coefficients[3]
-        relative = residual / bound if bound > 0.0 else 0.0
-        weights[p] = inside / (1.0 + relative * relative)
-        n, st, si = n + inside, st + inside * t, si + inside * light
-        stt, sii, sti = stt + inside * t * t, sii + inside * light * light, sti + inside * t * light
-    spread = (n * stt - st * st) * (n * sii - si * si)
-    return n, (n * sti - st * si) / math.sqrt(spread) if spread > 1e-12 else 0.0
-
-
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def weighted_gram(f, weights, scratch, gram):
-    """Weighted products of all pairs of features, summed over the points."""
-    for i in range(FEATURES):
-        for p in range(f.shape[1]):
-            scratch[p] = weights[p] * f[i, p]
-        for j in range(i, FEATURES):
-            total = 0.0
-            for p in range(f.shape[1]):
-                total += scratch[p] * f[j, p]
-            gram[i, j] = total
-            gram[j, i] = total
-
-
-@njit(cache=True, error_model="numpy")
-def eliminate_lighting(gram, coefficients):
-    """Gauss elimination of a marker's lighting, in place, and its solution; what is left is the Schur complement."""
-    for k in range(LIGHTING):
-        if gram[k, k] <= 1e-12:
-            continue
-        for i in range(k + 1, FEATURES):
-            factor = gram[k, i] / gram[k, k]
-            for j in range(k + 1, FEATURES):
-                gram[i, j] -= factor * gram[k, j]
-    for k in range(LIGHTING - 1, -1, -1):
-        value = gram[k, FEATURES - 1]
-        for j in range(k + 1, LIGHTING):
-            value -= gram[k, j] * coefficients[j]
-        coefficients[k] = value / gram[k, k] if gram[k, k] > 1e-12 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def linearise(codes, table, window, camera, pose, places, size, points, values, floor, limit,
-              coefficients, features, scratch, gram, correlation, weight, normal):  # fmt: skip
-    """The pose's normal equations from all markers at a pose; the number of markers that take part.
-
-    Args:
-        codes ... values: as in `observe`, for all markers.
-        floor: correlation below which a marker counts as occluded.
-        limit: as in `weigh`.
-        coefficients: (m, 4) lighting, read for the weights and replaced.
-        features (m, 11, p), scratch (2, p), gram (m, 11, 11): left behind, the lighting eliminated from `gram`; of each
-            marker's points, only the first p are used.
-        correlation, weight: (m,) of each marker; weight 0 is left out.
-        normal: (7, 7) sum over the markers of weight * gram[4:, 4:], in units of their gains.
-    """
-    normal[:] = 0.0
-    used = 0
-    for m in range(gram.shape[0]):
-        f = features[m]
-        observe(codes, table, window, camera, pose, places[m], size, points[m], values[m], f)
-        inside, correlation[m] = weigh(f, coefficients[m], limit, scratch[0])
-        weighted_gram(f, scratch[0], scratch[1], gram[m])
-        eliminate_lighting(gram[m], coefficients[m])
-        gain = coefficients[m, 0]
-        weight[m] = 0.0
-        if inside < 0.5 * f.shape[1] or correlation[m] < floor or gain <= 0.0:
-            continue
-        variance = max(gram[m, FEATURES - 1, FEATURES - 1], 0.0) / (gain * gain * inside)
-        weight[m] = 1.0 / (variance + SMALLEST_VARIANCE)
-        used += 1
-        for i in range(POSE + 1):
-            for j in range(POSE + 1):
-                scale = (1.0 if i < POSE else 1.0 / gain) * (1.0 if j < POSE else 1.0 / gain)
-                normal[i, j] += weight[m] * scale * gram[m, LIGHTING + i, LIGHTING + j]
-    return used
+def _functions() -> tuple["ctypes._NamedFuncPointer", "ctypes._NamedFuncPointer", "ctypes._NamedFuncPointer"]:
+    compiled = library(__file__, "alignment")
+    for function, kinds in (
+        (compiled.align, [ctypes.c_double, ctypes.c_int]),
+        (compiled.draw, [ctypes.c_double]),
+        (compiled.observe_markers, [ctypes.c_double]),
+    ):
+        function.argtypes = [ctypes.POINTER(_Shared), *kinds]
+    compiled.draw.restype = None
+    return compiled.align, compiled.draw, compiled.observe_markers

@@ -1,29 +1,13 @@
-"""The camera's projection with lens distortion, for compiled loops; OpenCV's model with all of its 14 terms."""
+"""The camera's projection with lens distortion as compiled loops read it (lens.h); OpenCV's model, all 14 terms."""
 
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from arlight.camera import Camera
 
 Array = NDArray[np.float64]
-
-
-@njit(cache=True, error_model="numpy")
-def project(camera, x, y):
-    """Pixel of normalised image coordinates; camera: fx, fy, cx, cy, 12 distortion terms, 9 of the tilt (OpenCV)."""
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (camera[4] + r2 * (camera[5] + r2 * camera[8]))
-    radial /= 1.0 + r2 * (camera[9] + r2 * (camera[10] + r2 * camera[11]))
-    p1, p2 = camera[6], camera[7]
-    xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (camera[12] + r2 * camera[13])
-    yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (camera[14] + r2 * camera[15])
-    w = camera[22] * xd + camera[23] * yd + camera[24]
-    xt = (camera[16] * xd + camera[17] * yd + camera[18]) / w
-    yt = (camera[19] * xd + camera[20] * yd + camera[21]) / w
-    return camera[0] * xt + camera[2], camera[1] * yt + camera[3]
 
 
 def camera_parameters(camera: Camera) -> Array:

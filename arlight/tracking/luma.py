@@ -26,7 +26,21 @@ def luma_codes(frame: Frame, radiometry: Radiometry | None = None) -> tuple[NDAr
     return frame.luma(), _table(PixelFormat("gray", True, 8, transfer=format_.transfer), radiometry)
 
 
+def luma_plane(
+    frame: Frame, radiometry: Radiometry | None = None
+) -> tuple[NDArray[np.uint8] | NDArray[np.uint16], NDArray[np.float32]]:
+    """Luma codes (h, w) as deep as the stream has them, uint8 or uint16, and the linear light (2^bits,) of each code.
+
+    The plane is handed on as it is; only R'G'B' is brought to full-range luma of 8 bits first. Arguments as in
+    `luma_codes`.
+    """
+    if frame.format.matrix == "rgb":
+        return luma_codes(frame, radiometry)
+    return frame.planes[0], _table(frame.format, radiometry)
+
+
 @lru_cache(maxsize=16)
 def _table(format_: PixelFormat, radiometry: Radiometry | None) -> NDArray[np.float32]:
     black, white = format_.luma_code_range
-    return decoding(format_.transfer, radiometry).linear((np.arange(256) - black) / white).astype(np.float32)
+    codes = np.arange(2**format_.bit_depth)
+    return decoding(format_.transfer, radiometry).linear((codes - black) / white).astype(np.float32)

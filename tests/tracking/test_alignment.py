@@ -6,14 +6,15 @@ import pytest
 
 from arlight.camera import Pose
 from arlight.color import encoded_from_linear, linear_from_encoded
-from arlight.tracking.alignment import SAMPLING_VARIANCE_PX2, FiducialAlignment, Picture
+from arlight.tracking.alignment import SAMPLING_VARIANCE_PX2, FiducialAlignment
+from arlight.tracking.alignment_kernels import Picture
 
 TABLE = linear_from_encoded(np.arange(256) / 255.0)
 BLUR_PX = 0.75
 
 
 def whole(luma: np.ndarray) -> Picture:
-    return Picture(np.ascontiguousarray(luma), TABLE, (0, 0))
+    return Picture(luma, TABLE)
 
 
 def moved(pose: Pose, camera, shift_px, turn_deg: float = 0.0) -> Pose:
@@ -88,15 +89,40 @@ def test_turning_the_sheet_s_own_axes_turns_the_pose(sheet, camera, look, photog
     assert other.blur_px == pytest.approx(plain.blur_px, abs=1e-7)
 
 
-def test_the_region_s_place_does_not_matter(sheet, camera, look, photograph) -> None:
+def test_only_what_is_around_the_markers_matters(sheet, camera, look, photograph) -> None:
     truth = look(30, 10, 420)
     luma = photograph(camera, truth)
+    pixels = camera.project(truth, sheet.outline_mm)
+    (x0, y0), (x1, y1) = np.floor(pixels.min(axis=0)).astype(int), np.ceil(pixels.max(axis=0)).astype(int)
+    scribbled = np.random.default_rng(3).integers(0, 256, luma.shape, dtype=np.uint8)
+    scribbled[y0:y1, x0:x1] = luma[y0:y1, x0:x1]
     alignment = FiducialAlignment(sheet, camera)
-    x0, y0, x1, y1 = alignment.region(truth)
-    assert (x1 - x0) * (y1 - y0) < 0.8 * luma.size
-    part = Picture(np.ascontiguousarray(luma[y0:y1, x0:x1]), TABLE, (x0, y0))
-    a, b = (alignment.align(picture, truth, BLUR_PX, 4) for picture in (part, whole(luma)))
-    np.testing.assert_allclose(a.pose.translation, b.pose.translation, atol=1e-9)
+    a, b = (alignment.align(whole(picture), truth, BLUR_PX, 1) for picture in (luma, scribbled))
+    np.testing.assert_array_equal(a.pose.translation, b.pose.translation)
+
+
+def test_a_plane_with_padded_rows_is_read_as_it_is(sheet, camera, look, photograph) -> None:
+    truth = look(30, 10, 420)
+    luma = photograph(camera, truth)
+    padded = np.pad(luma, ((0, 0), (0, 24)), constant_values=255)[:, : luma.shape[1]]
+    columns = np.repeat(luma, 2, axis=1)[:, ::2]
+    alignment = FiducialAlignment(sheet, camera)
+    found = [alignment.align(whole(picture), truth, BLUR_PX, 4) for picture in (luma, padded, columns)]
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.pose.rotation, found[0].pose.rotation)
+        np.testing.assert_array_equal(other.pose.translation, found[0].pose.translation)
+
+
+def test_deeper_codes_of_the_same_light_give_the_same_pose(sheet, camera, look, photograph) -> None:
+    truth = look(30, 10, 420)
+    luma = photograph(camera, truth)
+    deep = Picture(luma.astype(np.uint16) * 4 + 3, np.repeat(TABLE, 4))
+    np.testing.assert_array_equal(deep.eight_bits(), luma)
+    for coarsest in (1, 4):
+        # an alignment of its own: templates that a coarser level drew are kept
+        a, b = (FiducialAlignment(sheet, camera).align(p, truth, BLUR_PX, coarsest) for p in (whole(luma), deep))
+        # the same arithmetic, though the compiler may round it in another order
+        np.testing.assert_allclose(a.pose.translation, b.pose.translation, atol=1e-6)
 
 
 def test_covered_markers_are_left_out(sheet, camera, look, photograph, pose_error_px) -> None:
@@ -173,5 +199,7 @@ def test_a_flat_picture_holds_no_sheet(sheet, camera, look, level) -> None:
         Pose(np.diag([1.0, -1, -1]), np.array([0, 0, -300.0])),
     ],
 )
-def test_no_region_for_a_sheet_out_of_view(sheet, camera, pose) -> None:
-    assert FiducialAlignment(sheet, camera).region(pose) is None
+@pytest.mark.parametrize("coarsest", [1, 8])
+def test_no_alignment_for_a_sheet_out_of_view(sheet, camera, look, photograph, pose, coarsest) -> None:
+    picture = whole(photograph(camera, look(20, 0, 300), across=3))
+    assert FiducialAlignment(sheet, camera).align(picture, pose, BLUR_PX, coarsest) is None

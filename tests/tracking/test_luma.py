@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arlight.radiometry import Radiometry
-from arlight.tracking.luma import luma_codes
+from arlight.tracking.luma import luma_codes, luma_plane
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import PixelFormat, chroma_offset_px
 
@@ -46,6 +46,21 @@ def test_every_code_means_the_light_that_the_frame_says(name):
     # half a code of eight bits, times the steepest of the curves
     tolerance = 1e-5 if frame.format.bit_depth == 8 else 0.5 / 255 * 5
     np.testing.assert_allclose(table[codes], frame.linear_luma(), atol=tolerance)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_the_plane_s_own_codes_mean_that_light_too(name):
+    frame = frame_in(formats()[name])
+    codes, table = luma_plane(frame)
+    assert codes.shape == SHAPE
+    assert len(table) == (256 if frame.format.matrix == "rgb" else 2**frame.format.bit_depth)
+    np.testing.assert_allclose(table[codes], frame.linear_luma(), atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["video", "ten bits", "deep grey"])
+def test_the_plane_is_not_copied(name):
+    frame = frame_in(formats()[name])
+    assert np.shares_memory(luma_plane(frame)[0], frame.planes[0])
 
 
 @pytest.mark.parametrize("name", ["video", "jpeg", "grey", "limited grey"])

@@ -10,7 +10,7 @@ from arlight.camera import Camera
 from arlight.errors import CalibrationError
 from arlight.probe.design import Probe
 from arlight.radiometry import Radiometry
-from arlight.tracking.luma import luma_codes
+from arlight.tracking.luma import luma_plane
 from arlight.tracking.tracker import PoseTracker
 from arlight.video.frame import Frame
 
@@ -78,7 +78,7 @@ def _sightings(
                 f"the pictures must be encoded alike, found {used[0].format} and {frame.format}; give one camera's, at "
                 "one setting"
             )
-        codes, table = luma_codes(frame)
+        codes, table = luma_plane(frame)
         # apart in time: every picture is searched anew
         tracker.reset()
         pose = tracker.update(codes, frame.time_s, table).camera_from_probe

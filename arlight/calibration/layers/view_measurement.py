@@ -13,7 +13,7 @@ from arlight.estimation.nuisance import Nuisance
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.blocks import BlockMeter
-from arlight.tracking.luma import luma_codes
+from arlight.tracking.luma import luma_plane
 from arlight.tracking.pose import ProbePose
 from arlight.tracking.tracker import PoseTracker
 from arlight.video.frame import Frame
@@ -47,7 +47,7 @@ def find_sheet(frames: Iterable[Frame], probe: Probe, camera: Camera, light: int
     tracker = PoseTracker(probe, camera)
     seen = []
     for frame in frames:
-        codes, table = luma_codes(frame, camera.radiometry)
+        codes, table = luma_plane(frame, camera.radiometry)
         pose = tracker.update(codes, frame.time_s, table)
         if pose.camera_from_probe is not None and pose.status == "tracked":
             seen.append(SeenSheet(frame, pose, light))
