@@ -170,9 +170,7 @@ class LightingTracker:
             seen = self._exposure.measure(frame, pose.camera_from_probe)
             if np.all(seen.variance < (_LEVEL_DEVIATION * seen.level) ** 2):
                 self._level = seen.level
-        relative = None if raw is None else raw.scaled(1.0 / self._level)
-        lighting = self._filter.update(relative, frame.time_s)
-        return None if lighting is None else lighting.scaled(self._level)
+        return self._filter.update(raw, frame.time_s, self._level)
 
     def _cut(self, lighting: Lighting) -> Lighting:
         order = self._settings.order

@@ -7,12 +7,18 @@ mean, however fast it dies away. So nobody needs to know how fast the view chang
 show of R is in the mean.
 """
 
+import ctypes
+import math
+
 import numpy as np
-from numpy.typing import NDArray
 
-from arlight.estimation.memory import FadingMemory
+from arlight.estimation.relative_light import RelativeLight
+from arlight.native import Workspace, library
 
-Array = NDArray[np.float64]
+_LIBRARY = library(__file__, "common_error")
+_LIBRARY.push.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
+_LIBRARY.bend.argtypes = [ctypes.c_void_p, ctypes.c_int]
+_LIBRARY.bend.restype = ctypes.c_double
 
 _LEARNING_S = 1.0
 """Time over which shares are averaged [s]."""
@@ -24,85 +30,98 @@ _CHANCE = 1.15
 """Prediction errors over the expected ones that mean nothing."""
 
 
-class CommonError:
-    """Learns from the frames how much of their error is independent, and what of the rest several means keep."""
+class _Workspace(Workspace):
+    """What common_error.c calls LastFrames."""
 
-    def __init__(self, memory_s: float, means: int) -> None:
-        """Choose over which time [s] the measurements' covariance is averaged, and how many means there are."""
-        self._memory_s = memory_s
-        self._means = means
+    _fields_ = (
+        ("channels", ctypes.c_int64),
+        ("size", ctypes.c_int64),
+        ("values", ctypes.c_void_p),
+        ("variance", ctypes.c_void_p),
+    )
+
+
+class CommonError:
+    """Learns from the frames how much of their error is independent, and what of the rest several means keep.
+
+    Args:
+        means: how many means there are.
+        channels, size: shape (c, n) of the frames' numbers; the first of each channel is its level, which an exposure
+            changes as well: it is not judged.
+    """
+
+    def __init__(self, means: int, channels: int, size: int) -> None:
+        self._means = range(means)
+        self._last = _Workspace(channels, size)
+        self._last.hold({name: np.zeros((3, channels, size)) for name in ("values", "variance")})
+        self._at = ctypes.byref(self._last)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        self._independent = _Average(1, _LEARNING_S)
-        self._shown = _Average(self._means, _LEARNING_S)
-        self._lately = _Average(self._means, _CHANGE_S)
-        self._averaged = _Average(self._means, _LEARNING_S)
+        self._independent = _Average(_LEARNING_S)
+        self._shown = [_Average(_LEARNING_S) for _ in self._means]
+        self._lately = [_Average(_CHANGE_S) for _ in self._means]
+        self._averaged = [_Average(_LEARNING_S) for _ in self._means]
+        self._seen = 0
 
-    def start(self, values: Array, covariance: Array) -> None:
-        """Another light, seen first as (c, n) with covariance (c, n, n): what is known of the errors is kept."""
-        self._recent = [(_judged(values), _judged(np.einsum("cii->ci", covariance)))]
-        self._usual, self._weight = covariance, 1.0
+    def start(self, frame: RelativeLight) -> None:
+        """Another light, seen first in a frame: what is known of the errors is kept."""
+        self._seen = 0
+        self._push(frame)
 
     @property
     def independent(self) -> float:
         """Share of a frame's error that is independent of the other frames', in [0, 1]."""
-        return min(float(self._independent.value[0]), 1.0)
+        return min(self._independent.value, 1.0)
 
-    def learn(self, values: Array, covariance: Array, means: tuple[FadingMemory, ...], dt: float) -> None:
-        """Take in a frame dt [s] after the last, before the means do: (c, n) values with covariance (c, n, n)."""
-        variance = _judged(np.einsum("cii->ci", covariance))
-        self._typical(covariance, dt)
-        self._recent = [*self._recent[-2:], (_judged(values), variance)]
-        if len(self._recent) == 3:
-            (first, a), (second, b), (third, c) = self._recent
-            # light that moves steadily has no second difference
-            self._independent.take(np.array([np.mean((third - 2.0 * second + first) ** 2 / (a + 4.0 * b + c))]), dt)
-        shown = [np.mean((_judged(values) - _judged(mean.values)) ** 2 / variance) for mean in means]
-        averaged = [np.mean(_judged(np.einsum("cii->ci", mean.averaged)) / variance) for mean in means]
-        self._shown.take(np.array(shown), dt)
-        self._lately.take(np.array(shown), dt)
-        self._averaged.take(np.array(averaged), dt)
-
-    def covariance(self, which: int, averaged: Array) -> Array:
-        """Covariance (c, n, n) of a mean's error.
+    def learn(self, frame: RelativeLight, shown: list[float], averaged: list[float], dt: float) -> None:
+        """Take in a frame dt [s] after the last.
 
         Args:
-            which: place of the mean among those that `learn` was given.
-            averaged: (c, n, n) its covariance if the errors of all frames were independent.
+            frame: its light.
+            shown: of each mean, the squared distance of the frame from it over the frame's variance.
+            averaged: of each mean, its variance over the frame's if the errors of all frames were independent.
+            dt: time since the last frame [s].
+        """
+        slot = self._push(frame)
+        if self._seen >= 3:
+            # light that moves steadily has no second difference
+            self._independent.take(_LIBRARY.bend(self._at, slot), dt)
+        for mean in self._means:
+            self._shown[mean].take(shown[mean], dt)
+            self._lately[mean].take(shown[mean], dt)
+            self._averaged[mean].take(averaged[mean], dt)
+
+    def left(self, which: int) -> float:
+        """Share of a frame's variance that is left in a mean, beside what averaging leaves of the independent share.
+
+        Args:
+            which: place of the mean among those that `learn` was told of.
         """
         independent = self.independent
-        expected = independent * (1.0 + float(self._averaged.value[which]))
-        shown = float(self._shown.value[which])
+        expected = independent * (1.0 + self._averaged[which].value)
         common = 1.0 - independent
-        left = float(np.clip(common - (shown - expected), _NEVER_SHOWN * common, common))
+        left = min(max(common - (self._shown[which].value - expected), _NEVER_SHOWN * common), common)
         # more shown than a frame can err: the mean lags behind the light, or all error bars are too narrow
-        excess = max(float(self._lately.value[which]) - _CHANCE * (expected + common - left), 0.0)
-        return np.asarray(independent * averaged + (left + excess) * self._usual, float)
+        return left + max(self._lately[which].value - _CHANCE * (expected + common - left), 0.0)
 
-    def _typical(self, covariance: Array, dt: float) -> None:
-        """Mean of the frames' covariances; a frame that is less certain counts less."""
-        faded = self._weight * float(np.exp(-dt / self._memory_s))
-        weight = 1.0 / float(np.mean(np.einsum("cii->ci", covariance) / np.einsum("cii->ci", self._usual)))
-        self._usual = (faded * self._usual + weight * covariance) / (faded + weight)
-        self._weight = faded + weight
+    def _push(self, frame: RelativeLight) -> int:
+        slot = self._seen % 3
+        _LIBRARY.push(self._at, slot, frame.values_at, frame.variance_at)
+        self._seen += 1
+        return slot
 
 
 class _Average:
     """An average over the last second or, at first, over all there is."""
 
-    def __init__(self, size: int, memory_s: float) -> None:
-        self.value = np.zeros(size)
+    def __init__(self, memory_s: float) -> None:
+        self.value = 0.0
         self._memory_s = memory_s
         self._count = 0
 
-    def take(self, values: Array, dt: float) -> None:
+    def take(self, value: float, dt: float) -> None:
         self._count += 1
-        share = max(1.0 - float(np.exp(-dt / self._memory_s)), 1.0 / self._count)
-        self.value = self.value + share * (values - self.value)
-
-
-def _judged(values: Array) -> Array:
-    """The relative coefficients: the level is the exposure's as well."""
-    return values[:, 1:] if values.shape[1] > 1 else values
+        share = max(1.0 - math.exp(-dt / self._memory_s), 1.0 / self._count)
+        self.value += share * (value - self.value)

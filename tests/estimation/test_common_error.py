@@ -5,10 +5,11 @@ import pytest
 
 from arlight.estimation.common_error import CommonError
 from arlight.estimation.memory import FadingMemory
+from arlight.estimation.relative_light import RelativeLight
 
 FRAME_S, MEMORY_S, SIZE = 0.04, 2.0, 40
 SIGMA = 0.03
-COVARIANCE = SIGMA**2 * np.tile(np.eye(SIZE), (3, 1, 1))
+VARIANCE = np.full((3, SIZE), SIGMA**2)
 TRUTH = np.random.default_rng(0).normal(size=(3, SIZE))
 
 
@@ -23,29 +24,38 @@ def errors(independent, lasting_s, frames, seed=1):
         yield SIGMA * (np.sqrt(independent) * new + np.sqrt(1.0 - independent) * common)
 
 
-def averaged(strayed, drift=0.0, stated=COVARIANCE):
+def averaged(strayed, drift=0.0):
     """A mean over frames with the given errors, and what has been learnt beside it.
 
     Returns:
         The learner, the mean, and mean squared errors over stated variances, one a frame of the second half.
     """
-    memory, common = FadingMemory(MEMORY_S, trend=False), CommonError(MEMORY_S, 1)
+    memory, common = FadingMemory(MEMORY_S, 3, SIZE, trend=False), CommonError(1, 3, SIZE)
+    frame = RelativeLight(3, SIZE)
+    frame.variance[:] = VARIANCE
     strayed = list(strayed)
     ratios = []
     for number, error in enumerate(strayed):
         truth = TRUTH + drift * number * FRAME_S
-        values = truth + error
+        frame.values[:] = truth + error
         if number == 0:
-            memory.start(values, stated, np.ones((3, SIZE)))
-            common.start(values, stated)
+            memory.start(frame.values, VARIANCE, np.ones((3, SIZE)))
+            common.start(frame)
             continue
         memory.predict(FRAME_S, np.full((3, SIZE), 10.0))
-        common.learn(values, stated, (memory,), FRAME_S)
-        memory.correct(values, stated)
+        _, shown, kept = memory.judge(frame)
+        common.learn(frame, [shown], [kept * memory.averaged], FRAME_S)
+        memory.correct(frame.values - memory.values, frame)
         if number > len(strayed) // 2:
-            said = np.einsum("cii->ci", common.covariance(0, memory.averaged))[:, 1:]
-            ratios.append(np.mean((memory.values - truth)[:, 1:] ** 2) / said.mean())
+            ratios.append(np.mean((memory.values - truth)[:, 1:] ** 2) / said(common, memory))
     return common, memory, np.array(ratios)
+
+
+def said(common, memory):
+    """Variance that is told of a mean's error."""
+    told = RelativeLight(3, SIZE)
+    memory.tell(told, 1.0, common.independent, common.left(0), VARIANCE)
+    return told.variance[:, 1:].mean()
 
 
 @pytest.mark.parametrize("independent", [0.1, 0.5, 1.0])
@@ -64,27 +74,25 @@ def test_the_mean_errs_as_is_said_however_fast_the_errors_die_away(independent, 
 
 def test_errors_that_never_change_are_not_averaged_away():
     common, memory, _ = averaged(errors(0.0, 1e6, 200))
-    said = np.einsum("cii->ci", common.covariance(0, memory.averaged)).mean()
     # nothing shows them, so a part of them is assumed: far more than averaging 100 frames would leave
-    assert said > 0.15 * SIGMA**2
-    assert said > 5.0 * np.einsum("cii->ci", memory.averaged).mean()
+    assert said(common, memory) > 0.15 * SIGMA**2
+    assert said(common, memory) > 5.0 * memory.averaged * memory.corrected.mean()
 
 
 def test_independent_errors_leave_what_averaging_leaves():
     common, memory, _ = averaged(errors(1.0, 1.0, 400))
-    said = np.einsum("cii->ci", common.covariance(0, memory.averaged)).mean()
-    left = np.einsum("cii->ci", memory.averaged).mean()
+    left = memory.averaged * memory.corrected.mean()
     # the share is learnt to a few per cent of a frame's variance, of which averaging leaves one
-    assert left * 0.9 < said < left + 0.01 * SIGMA**2
+    assert left * 0.9 < said(common, memory) < left + 0.01 * SIGMA**2
     assert left == pytest.approx(0.01 * SIGMA**2, rel=0.1)
 
 
 def test_a_mean_that_lags_behind_the_light_says_so():
     steady, following = (averaged(errors(1.0, 1.0, 150), drift=drift) for drift in (0.0, 0.1))
     lag = np.mean((following[1].values - TRUTH - 0.1 * 149 * FRAME_S) ** 2)
-    said = [np.einsum("cii->ci", c.covariance(0, m.averaged)).mean() for c, m, _ in (steady, following)]
-    assert lag > 5.0 * said[0]
-    assert said[1] == pytest.approx(lag, rel=0.4)
+    told = [said(common, memory) for common, memory, _ in (steady, following)]
+    assert lag > 5.0 * told[0]
+    assert told[1] == pytest.approx(lag, rel=0.4)
 
 
 def test_steady_motion_of_the_light_is_not_taken_for_independent_errors():
@@ -100,18 +108,29 @@ def test_the_exposures_level_is_not_judged():
 
 def test_forgetting_begins_again_and_another_light_does_not():
     common, _, _ = averaged(errors(0.2, 3.0, 200))
-    learnt = common.independent
-    common.start(TRUTH, COVARIANCE)
+    learnt, frame = common.independent, RelativeLight(3, SIZE)
+    frame.values[:], frame.variance[:] = TRUTH, VARIANCE
+    common.start(frame)
     assert common.independent == learnt
     common.reset()
-    common.start(TRUTH, COVARIANCE)
+    common.start(frame)
     assert common.independent == 0.0
 
 
-def test_covariances_stay_positive_and_symmetric():
-    factors = np.random.default_rng(5).normal(size=(3, SIZE, 2 * SIZE))
-    stated = SIGMA**2 * factors @ factors.swapaxes(1, 2) / (2 * SIZE)
-    common, memory, _ = averaged(errors(0.5, 1.0, 60), stated=stated)
-    said = common.covariance(0, memory.averaged)
-    np.testing.assert_allclose(said, said.swapaxes(1, 2), atol=1e-12)
-    assert np.linalg.eigvalsh(said).min() > 0.0
+def test_shares_are_those_of_second_differences_written_out():
+    generator = np.random.default_rng(5)
+    values, variances = generator.normal(size=(5, 3, SIZE)), generator.uniform(0.5, 2.0, (5, 3, SIZE))
+    common, frame = CommonError(1, 3, SIZE), RelativeLight(3, SIZE)
+    shares = []
+    for number in range(5):
+        frame.values[:], frame.variance[:] = 0.3 * values[number], variances[number]
+        if number == 0:
+            common.start(frame)
+            continue
+        common.learn(frame, [1.0], [0.5], 10.0)
+        if number >= 2:
+            bent = 0.3 * (values[number] - 2.0 * values[number - 1] + values[number - 2])
+            own = variances[number] + 4.0 * variances[number - 1] + variances[number - 2]
+            shares.append(np.mean((bent**2 / own)[:, 1:]))
+    # frames ten seconds apart: the last one counts
+    assert common.independent == pytest.approx(shares[-1], rel=1e-3)

@@ -4,146 +4,185 @@ import numpy as np
 import pytest
 
 from arlight.estimation.memory import FadingMemory
+from arlight.estimation.relative_light import RelativeLight
 
-CHANNELS, SIZE = 3, 4
-ENDLESS = np.full((CHANNELS, SIZE), np.inf)
+SHAPE = CHANNELS, SIZE = 3, 5
+ENDLESS = np.full(SHAPE, np.inf)
 
 
-def random_covariance(generator, scale=1.0):
-    factors = generator.normal(size=(CHANNELS, SIZE, SIZE + 3))
-    return scale * factors @ factors.swapaxes(1, 2) / SIZE
+def measurement(values, variance):
+    light = RelativeLight(*SHAPE)
+    light.values[:], light.variance[:] = values, variance
+    return light
 
 
 def observations(seed, count=12):
     generator = np.random.default_rng(seed)
     times = np.cumsum(generator.uniform(0.01, 0.2, count)) - 0.01
-    return times, generator.normal(size=(count, CHANNELS, SIZE)), [random_covariance(generator) for _ in range(count)]
+    return times, generator.normal(size=(count, *SHAPE)), generator.uniform(0.3, 3.0, (count, *SHAPE))
 
 
-def filtered(memory, times, values, covariances, rate=0.0):
-    memory.start(values[0], covariances[0], np.full((CHANNELS, SIZE), rate))
-    for before, now, value, covariance in zip(times[:-1], times[1:], values[1:], covariances[1:], strict=True):
+def take_in(memory, values, variance):
+    memory.correct(values - memory.values, measurement(values, variance))
+
+
+def filtered(memory, times, values, variances, rate=0.0):
+    memory.start(values[0], variances[0], np.full(SHAPE, rate))
+    for before, now, value, variance in zip(times[:-1], times[1:], values[1:], variances[1:], strict=True):
         memory.predict(now - before, ENDLESS)
-        memory.correct(value, covariance)
+        take_in(memory, value, variance)
     return memory
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_without_trend_it_is_the_faded_weighted_mean(seed):
-    times, values, covariances = observations(seed)
-    memory = filtered(FadingMemory(0.4, trend=False), times, values, covariances)
-    for c in range(CHANNELS):
-        weights = [
-            np.exp(-(times[-1] - t) / 0.4) * np.linalg.inv(r[c]) for t, r in zip(times, covariances, strict=True)
-        ]
-        covariance = np.linalg.inv(sum(weights))
-        mean = covariance @ sum(w @ z[c] for w, z in zip(weights, values, strict=True))
-        np.testing.assert_allclose(memory.values[c], mean, rtol=1e-8, atol=1e-10)
-        np.testing.assert_allclose(memory.covariance[c], covariance, rtol=1e-8, atol=1e-10)
+    times, values, variances = observations(seed)
+    memory = filtered(FadingMemory(0.4, *SHAPE, trend=False), times, values, variances)
+    weights = np.exp((times - times[-1]) / 0.4)[:, None, None] / variances
+    np.testing.assert_allclose(memory.values, np.sum(weights * values, axis=0) / weights.sum(axis=0), rtol=1e-8)
+    np.testing.assert_allclose(memory.variance, 1.0 / weights.sum(axis=0), rtol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_with_trend_it_is_the_faded_straight_line(seed):
-    times, values, covariances = observations(seed)
+    times, values, variances = observations(seed)
     rate, memory_s = 2.0, 0.4
-    memory = filtered(FadingMemory(memory_s, trend=True), times, values, covariances, rate)
-    for c in range(CHANNELS):
+    memory = filtered(FadingMemory(memory_s, *SHAPE, trend=True), times, values, variances, rate)
+    faded = np.exp((times - times[-1]) / memory_s)
+    line = np.stack([np.ones_like(times), times - times[-1]], axis=1)
+    for place in np.ndindex(SHAPE):
         # unknown: value and slope at the last time
-        normal, right = np.zeros((2 * SIZE, 2 * SIZE)), np.zeros(2 * SIZE)
-        normal[SIZE:, SIZE:] = np.eye(SIZE) / rate**2 * np.exp(-(times[-1] - times[0]) / memory_s)
-        for t, z, r in zip(times, values, covariances, strict=True):
-            line = np.hstack([np.eye(SIZE), (t - times[-1]) * np.eye(SIZE)])
-            weight = np.exp(-(times[-1] - t) / memory_s) * np.linalg.inv(r[c])
-            normal += line.T @ weight @ line
-            right += line.T @ weight @ z[c]
-        solution, covariance = np.linalg.solve(normal, right), np.linalg.inv(normal)
-        np.testing.assert_allclose(memory.values[c], solution[:SIZE], rtol=1e-7, atol=1e-9)
-        np.testing.assert_allclose(memory.velocity[c], solution[SIZE:], rtol=1e-7, atol=1e-9)
-        np.testing.assert_allclose(memory.covariance[c], covariance[:SIZE, :SIZE], rtol=1e-7, atol=1e-9)
+        weights = faded / variances[(slice(None), *place)]
+        normal = line.T @ (weights[:, None] * line) + np.diag([0.0, faded[0] / rate**2])
+        solution = np.linalg.solve(normal, line.T @ (weights * values[(slice(None), *place)]))
+        found = np.array([memory.values[place], memory.velocity[place]])
+        np.testing.assert_allclose(found, solution, rtol=1e-7, atol=1e-9)
+        spread = [[memory.variance[place], memory.cross[place]], [memory.cross[place], memory.moving[place]]]
+        np.testing.assert_allclose(spread, np.linalg.inv(normal), rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("trend", [False, True])
 def test_two_steps_are_one_long_step(trend):
     generator = np.random.default_rng(4)
-    values, covariance = generator.normal(size=(CHANNELS, SIZE)), random_covariance(generator)
+    values, variance = generator.normal(size=SHAPE), generator.uniform(0.5, 2.0, SHAPE)
     results = []
     for steps in ([0.3], [0.1, 0.05, 0.15]):
-        memory = FadingMemory(0.5, trend=trend)
-        memory.start(values, covariance, np.full((CHANNELS, SIZE), 1.5))
+        memory = FadingMemory(0.5, *SHAPE, trend=trend)
+        memory.start(values, variance, np.full(SHAPE, 1.5))
         for dt in (0.04, 0.04):
             memory.predict(dt, ENDLESS)
-            memory.correct(values + 0.1, covariance)
+            take_in(memory, values + 0.1, variance)
         for dt in steps:
             memory.predict(dt, ENDLESS)
         results.append(memory)
     np.testing.assert_allclose(results[0].values, results[1].values, rtol=1e-9)
-    np.testing.assert_allclose(results[0].covariance, results[1].covariance, rtol=1e-9)
+    np.testing.assert_allclose(results[0].variance, results[1].variance, rtol=1e-9)
 
 
 @pytest.mark.parametrize("trend", [False, True])
 def test_no_time_passes_in_a_step_of_zero(trend):
-    memory = filtered(FadingMemory(0.3, trend=trend), *observations(5), 1.0)
-    values, covariance = memory.values.copy(), memory.covariance.copy()
+    memory = filtered(FadingMemory(0.3, *SHAPE, trend=trend), *observations(5), 1.0)
+    values, variance = memory.values.copy(), memory.variance.copy()
     memory.predict(0.0, ENDLESS)
     np.testing.assert_array_equal(memory.values, values)
-    np.testing.assert_allclose(memory.covariance, covariance, rtol=1e-12)
+    np.testing.assert_allclose(memory.variance, variance, rtol=1e-12)
 
 
 def test_a_steady_change_is_followed_without_lag():
-    memory = FadingMemory(0.25, trend=True)
-    slope = np.random.default_rng(6).normal(size=(CHANNELS, SIZE))
-    covariance = np.tile(np.eye(SIZE) * 1e-4, (CHANNELS, 1, 1))
-    memory.start(0.0 * slope, covariance, np.full((CHANNELS, SIZE), 10.0))
+    memory = FadingMemory(0.25, *SHAPE, trend=True)
+    slope = np.random.default_rng(6).normal(size=SHAPE)
+    variance = np.full(SHAPE, 1e-4)
+    memory.start(0.0 * slope, variance, np.full(SHAPE, 10.0))
     for step in range(1, 60):
         memory.predict(0.04, ENDLESS)
-        memory.correct(0.04 * step * slope, covariance)
+        take_in(memory, 0.04 * step * slope, variance)
     np.testing.assert_allclose(memory.values, 0.04 * 59 * slope, atol=1e-5)
     np.testing.assert_allclose(memory.velocity, slope, atol=1e-4)
 
 
 @pytest.mark.parametrize("trend", [False, True])
-def test_variance_grows_up_to_the_ceiling_and_stays_a_covariance(trend):
-    memory = filtered(FadingMemory(0.3, trend=trend), *observations(7), 1.0)
-    ceiling = np.random.default_rng(8).uniform(5.0, 20.0, (CHANNELS, SIZE))
-    last = np.einsum("cii->ci", memory.covariance)
+def test_variance_grows_up_to_the_ceiling(trend):
+    memory = filtered(FadingMemory(0.3, *SHAPE, trend=trend), *observations(7), 1.0)
+    ceiling = np.random.default_rng(8).uniform(5.0, 20.0, SHAPE)
+    last = memory.variance.copy()
     for _ in range(200):
         memory.predict(0.1, ceiling)
-        variance = np.einsum("cii->ci", memory.covariance)
-        assert np.all(variance <= ceiling * (1 + 1e-9))
-        assert np.all(variance >= np.minimum(last, ceiling) * (1 - 1e-9))
-        assert np.linalg.eigvalsh(memory.covariance).min() > -1e-9
-        last = variance
+        assert np.all(memory.variance <= ceiling * (1 + 1e-9))
+        assert np.all(memory.variance >= np.minimum(last, ceiling) * (1 - 1e-9))
+        # value and velocity keep a joint covariance
+        assert np.all(memory.cross**2 <= memory.variance * memory.moving * (1 + 1e-9))
+        last = memory.variance.copy()
     np.testing.assert_allclose(last, ceiling, rtol=1e-9)
     memory.predict(1e6, ceiling)
-    assert np.all(np.isfinite(memory.covariance))
+    assert np.all(np.isfinite(memory.variance))
 
 
 @pytest.mark.parametrize("trend", [False, True])
-def test_covariance_stays_one_over_many_frames(trend):
+def test_variance_stays_one_over_many_frames(trend):
     generator = np.random.default_rng(9)
-    memory = FadingMemory(0.5, trend=trend)
-    covariance = random_covariance(generator, 1e-4)
-    memory.start(np.zeros((CHANNELS, SIZE)), covariance, np.ones((CHANNELS, SIZE)))
+    memory, variance = FadingMemory(0.5, *SHAPE, trend=trend), np.full(SHAPE, 1e-4)
+    memory.start(np.zeros(SHAPE), variance, np.ones(SHAPE))
     for _ in range(2000):
         memory.predict(0.04, ENDLESS)
-        memory.correct(generator.normal(size=(CHANNELS, SIZE)) * 0.01, covariance)
-    np.testing.assert_array_equal(memory.covariance, memory.covariance.swapaxes(1, 2))
-    assert np.linalg.eigvalsh(memory.covariance).min() > 0.0
+        take_in(memory, generator.normal(size=SHAPE) * 0.01, variance)
     # the balance between old and new is that of the memory: so many frames count
-    share = memory.covariance[:, 0, 0] / covariance[:, 0, 0]
-    assert np.all(share < 0.25)
-    assert np.all(share > 0.04)
+    assert np.all(memory.variance < 0.25 * variance)
+    assert np.all(memory.variance > 0.04 * variance)
+
+
+def test_a_measurement_is_judged_by_all_but_the_levels():
+    memory = filtered(FadingMemory(0.4, *SHAPE, trend=False), *observations(11))
+    generator = np.random.default_rng(12)
+    measured = measurement(generator.normal(size=SHAPE), generator.uniform(0.3, 3.0, SHAPE))
+    distance = ((measured.values - memory.values) ** 2)[:, 1:]
+    own, before = measured.variance[:, 1:], memory.corrected[:, 1:].copy()
+    memory.predict(0.1, ENDLESS)
+    expected = [np.mean(distance / (own + memory.variance[:, 1:])), np.mean(distance / own), np.mean(before / own)]
+    np.testing.assert_allclose(memory.judge(measured), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("trend", [False, True])
+def test_what_is_told_has_the_variance_of_independent_errors(trend):
+    # two hundred frames of the same weight, averaged with fading weights
+    memory, variance = FadingMemory(1.0, *SHAPE, trend=trend), np.full(SHAPE, 2.0)
+    memory.start(np.zeros(SHAPE), variance, np.full(SHAPE, 100.0))
+    errors, generator = [], np.random.default_rng(13)
+    for frame in range(2000):
+        memory.predict(0.05, ENDLESS)
+        take_in(memory, generator.normal(size=SHAPE) * np.sqrt(2.0), variance)
+        if frame > 200:
+            errors.append(memory.values.copy())
+    told = measurement(np.zeros(SHAPE), np.zeros(SHAPE))
+    memory.tell(told, 1.0, 1.0, 0.0, variance)
+    np.testing.assert_array_equal(told.values, memory.values)
+    assert np.mean(np.square(errors)) == pytest.approx(told.variance.mean(), rel=0.15)
+
+
+def test_a_freed_level_is_told_as_uncertain_as_it_is():
+    memory = filtered(FadingMemory(0.4, *SHAPE, trend=False), *observations(14))
+    memory.free_level(1, 1e6)
+    value = np.random.default_rng(15).normal(size=SHAPE)
+    take_in(memory, value, np.full(SHAPE, 0.5))
+    assert memory.values[1, 0] == pytest.approx(value[1, 0], rel=1e-4)
+    told = measurement(np.zeros(SHAPE), np.zeros(SHAPE))
+    memory.tell(told, 1.0, 1.0, 0.25, np.full(SHAPE, 0.5))
+    assert told.variance[1, 0] == pytest.approx(0.5 + 0.25 * 0.5, rel=1e-4)
+    np.testing.assert_allclose(told.variance[:, 1:], memory.averaged * memory.corrected[:, 1:] + 0.125, rtol=1e-12)
 
 
 def test_starting_again_forgets_and_does_not_touch_what_it_was_given():
-    times, values, covariances = observations(10)
-    used, new = FadingMemory(0.4, trend=True), FadingMemory(0.4, trend=True)
-    given, given_covariance = values[0].copy(), covariances[0].copy()
-    filtered(used, times, values, covariances, 3.0)
+    times, values, variances = observations(10)
+    used, new = (FadingMemory(0.4, *SHAPE, trend=True) for _ in range(2))
+    given, given_variance = values[0].copy(), variances[0].copy()
+    filtered(used, times, values, variances, 3.0)
+    used.free_level(0, 1.0)
     np.testing.assert_array_equal(values[0], given)
-    np.testing.assert_array_equal(covariances[0], given_covariance)
-    for memory in (filtered(used, times, -values, covariances, 1.0), filtered(new, times, -values, covariances, 1.0)):
-        results = memory.values, memory.covariance, memory.velocity
-    np.testing.assert_array_equal(used.values, results[0])
-    np.testing.assert_array_equal(used.covariance, results[1])
-    np.testing.assert_array_equal(used.velocity, results[2])
+    np.testing.assert_array_equal(variances[0], given_variance)
+    results = []
+    for memory in (used, new):
+        filtered(memory, times, -values, variances, 1.0)
+        told = measurement(np.zeros(SHAPE), np.zeros(SHAPE))
+        memory.tell(told, 1.0, 0.5, 0.25, variances[0])
+        results.append((memory.values, memory.variance, memory.velocity, told.variance))
+    for one, other in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, other)
