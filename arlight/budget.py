@@ -1,0 +1,125 @@
+"""Holds a deadline: moves along a ladder of efforts by the time that frames took.
+
+A ladder lists points of the measured front of cost against error, the best first, each with what it costs relative to
+the first. Every frame's time, divided by the cost of its rung, says how fast the machine is now; the rung is the best
+one that nearly all frames of late would have made in time. When even the cheapest is too slow, frames are left out.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_REMEMBERED = 90
+"""Frames whose times count."""
+_IN_TIME = 0.98
+"""Share of them that a rung is to make in time."""
+_ROOM = 0.85
+"""Share of the budget that a better rung may take before it is tried."""
+_FIRST_LOOK, _LOOK_EVERY = 5, 30
+"""Frames after the start, and after a change, before a better rung is tried."""
+_LONGEST_DOUBT = 16
+"""How many times as long a rung is left alone, at most, that was tried in vain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much work a frame may cost: what can change from one frame to the next."""
+
+    order: int
+    """Highest order of the light that is measured and drawn."""
+    samples_per_block: int
+    """Pixels a block is sampled with at most."""
+    estimate_every: int = 1
+    """The light is measured in every n-th frame and predicted between."""
+    supersampling: int = 2
+    """Samples along a pixel's side when drawing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """A point of the front."""
+
+    effort: Effort
+    """The settings."""
+    estimate_cost: float
+    """What tracking and estimating cost, relative to the ladder's first rung."""
+    draw_cost: float
+    """What drawing costs, relative to the ladder's first rung."""
+
+
+class BudgetController:
+    """Chooses the effort of every frame.
+
+    Args:
+        budget_s: time that a frame may take from decoded to composed [s].
+        ladder: rungs, the best and most expensive first.
+    """
+
+    def __init__(self, budget_s: float, ladder: Sequence[Rung]) -> None:
+        if not budget_s > 0.0 or not ladder:
+            raise ValueError(f"a budget needs a positive time and at least one rung, found {budget_s} s, {len(ladder)}")
+        self.budget_s = budget_s
+        self._ladder = tuple(ladder)
+        self._costs = np.array([[rung.estimate_cost, rung.draw_cost] for rung in ladder])
+        self._speeds: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
+        # from the cheapest upward: the first frames shall not be late
+        self._place = len(ladder) - 1
+        self._wait = _FIRST_LOOK
+        self._doubt = np.ones(len(ladder), int)
+        self._owed = 0.0
+        self.frames_at = np.zeros(len(ladder), int)
+        """How many frames each rung has made."""
+        self.late = 0
+        """Frames that took longer than the budget."""
+        self.left_out = 0
+        """Frames that were not worked on."""
+
+    @property
+    def effort(self) -> Effort:
+        """What the next frame may cost."""
+        return self._ladder[self._place].effort
+
+    def leaves_out(self) -> bool:
+        """Whether the next frame is to be left out; ask once a frame."""
+        if self._owed < self.budget_s:
+            return False
+        self._owed -= self.budget_s
+        self.left_out += 1
+        return True
+
+    def took(self, estimate_s: float, draw_s: float) -> None:
+        """Learn what a frame took, at the present effort [s]."""
+        total = estimate_s + draw_s
+        self.frames_at[self._place] += 1
+        self.late += total > self.budget_s
+        self._speeds.append(np.array([estimate_s, draw_s]) / np.maximum(self._costs[self._place], 1e-9))
+        cheapest = self._place == len(self._ladder) - 1
+        self._owed = max(self._owed + total - self.budget_s, 0.0) if cheapest else 0.0
+        self._wait -= 1
+        expected = self._expected()
+        if expected[self._place] > self.budget_s and not cheapest:
+            self._fall(expected)
+        elif self._wait <= 0:
+            self._rise(expected)
+
+    def _expected(self) -> NDArray[np.float64]:
+        """(rungs,) time that nearly all frames of late would have stayed within [s]."""
+        return np.quantile(np.array(self._speeds) @ self._costs.T, _IN_TIME, axis=0, method="higher")
+
+    def _fall(self, expected: NDArray[np.float64]) -> None:
+        self._doubt[self._place] = min(2 * self._doubt[self._place], _LONGEST_DOUBT)
+        cheaper = np.arange(len(expected)) > self._place
+        fits = np.flatnonzero(cheaper & (expected <= self.budget_s))
+        self._move(int(fits[0]) if len(fits) else len(expected) - 1)
+
+    def _rise(self, expected: NDArray[np.float64]) -> None:
+        if self._place == 0 or expected[self._place - 1] > _ROOM * self.budget_s:
+            return
+        if self._wait + _LOOK_EVERY * (self._doubt[self._place - 1] - 1) <= 0:
+            self._move(self._place - 1)
+
+    def _move(self, place: int) -> None:
+        self._place, self._wait = place, _LOOK_EVERY if len(self._speeds) >= _LOOK_EVERY else _FIRST_LOOK
