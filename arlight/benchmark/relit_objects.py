@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.calibration.ball.mirror_ball import MapGrid
-from arlight.rendering.reconstruction import hemisphere_points
+from arlight.estimation.radiance_prior import hemisphere_points
 
 Array = NDArray[np.float64]
 FloatArray = NDArray[np.float32]

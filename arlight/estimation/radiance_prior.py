@@ -48,7 +48,7 @@ def predicted_sky(slab: Slab, frequencies: ArrayLike) -> Array:
     """Radiance (n, 2k - 1) toward `sky_directions` that unit real-packed coefficients predict."""
     operator = received_operator(slab, frequencies, *sky_directions())
     told = sky_covariance() @ operator.T
-    return np.asarray(np.linalg.solve(_observed(operator @ told), told.T).T, float)
+    return np.asarray(np.linalg.solve(observed_covariance(operator @ told), told.T).T, float)
 
 
 def received_operator(slab: Slab, frequencies: ArrayLike, directions: Array, solid_angle_sr: Array) -> Array:
@@ -68,18 +68,9 @@ def radiance_covariance(first: Array, second: Array) -> Array:
     return np.asarray(_PRIOR_CONSTANT + _PRIOR_VARYING * np.exp(-angle / _PRIOR_ANGLE_RAD), float)
 
 
-def predictor(operator: Array, directions: Array) -> Array:
-    """A^T (A C A^T + S)^-1 (n, m): C of any directions with these, times it, predicts radiance from coefficients.
+def observed_covariance(gram: Array) -> Array:
+    """Covariance A C A^T + S (m, m) of coefficients as they are measured, by that of the coefficients, A C A^T.
 
-    Args:
-        operator: A (m, n), as `received_operator` has it for the directions (n, 3).
-
-    S is a fixed share of the prior's own L~_0, so the prediction does not depend on the light's scale.
+    S is a fixed share of the prior's own L~_0, so what is predicted of them does not depend on the light's scale.
     """
-    gram = operator @ radiance_covariance(directions, directions) @ operator.T
-    return np.asarray(np.linalg.solve(_observed(gram), operator).T, float)
-
-
-def _observed(gram: Array) -> Array:
-    """Covariance of the coefficients as they are measured, by that of the coefficients."""
     return np.asarray(gram + _TYPICAL_NOISE**2 * gram[0, 0] * np.eye(len(gram)), float)

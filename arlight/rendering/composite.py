@@ -1,77 +1,87 @@
 """Differential rendering in linear light: the plane darkens by a ratio, the object covers, nothing else changes."""
 
+import ctypes
+
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.native import Workspace, address, library
 from arlight.rendering.shadow import PlaneGrid
 from arlight.video.frame import Region
 
 Image = NDArray[np.float32]
 
+_CELL_PX = 8
+"""Between two nodes of the net of rays, as in composite.c: a lens bends what lies between by less than 0.02 px."""
+_native = library(__file__, "composite")
+_native.shade_plane.restype = _native.cover.restype = None
+_native.shade_plane.argtypes = [ctypes.c_void_p]
+_native.cover.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
 
-def shade_plane(
-    linear: Image, region: Region, camera: Camera, camera_from_probe: Pose, grid: PlaneGrid, ratio: Image
-) -> None:
-    """Multiply a region of the frame, in place, by the shadow's ratio at the point of the plane that each pixel sees.
 
-    Args:
-        linear: (h, w, 3) linear light of `region`, changed in place.
-        region: pixels of the frame.
-        camera: intrinsics; lens distortion is followed exactly.
-        camera_from_probe: the pose.
-        grid: where the ratio's texels lie on the plane z = 0.
-        ratio: (side, side, 3) irradiance with the object over irradiance without.
-    """
-    homography = np.column_stack(
-        [camera_from_probe.rotation[:, 0], camera_from_probe.rotation[:, 1], camera_from_probe.translation]
+class _Plane(Workspace):
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("linear", "rays", "ratio")),
+        *((name, ctypes.c_int64) for name in ("x0", "y0", "width", "height", "node_columns", "side")),
+        ("texel_from_ray", ctypes.c_double * 9),
     )
-    texel_from_plane = np.array(
-        [
-            [1.0 / grid.texel_mm, 0.0, -grid.corner_mm[0] / grid.texel_mm - 0.5],
-            [0.0, 1.0 / grid.texel_mm, -grid.corner_mm[1] / grid.texel_mm - 0.5],
-            [0.0, 0.0, 1.0],
-        ]
-    )
-    texel_from_ray = texel_from_plane @ np.linalg.inv(homography)
-    rays = camera.ray_map[region.y0 : region.y1, region.x0 : region.x1]
-    _multiply(linear, rays, texel_from_ray.astype(np.float32), np.ascontiguousarray(ratio, np.float32))
+
+
+class PlaneShader:
+    """Darkens the plane in a camera's frames."""
+
+    def __init__(self, camera: Camera, grid: PlaneGrid) -> None:
+        """Follow the camera's rays, lens distortion included.
+
+        Args:
+            camera: intrinsics.
+            grid: where the ratio's texels lie on the plane z = 0.
+        """
+        # one node beyond the last pixel on each side, so that every cell has two
+        x, y = (np.arange(size // _CELL_PX + 2) * float(_CELL_PX) for size in camera.image_size)
+        nodes = np.stack(np.meshgrid(x, y), axis=-1)
+        rays = camera.rays(nodes.reshape(-1, 2)).astype(np.float32)
+        self._plane = _Plane(node_columns=len(x), side=grid.side)
+        self._plane.hold({"rays": rays})
+        self._texel_from_plane = np.array(
+            [
+                [1.0 / grid.texel_mm, 0.0, -grid.corner_mm[0] / grid.texel_mm - 0.5],
+                [0.0, 1.0 / grid.texel_mm, -grid.corner_mm[1] / grid.texel_mm - 0.5],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
+    def shade(self, linear: Image, region: Region, camera_from_probe: Pose, ratio: Image) -> None:
+        """Multiply a region of the frame, in place, by the ratio at the point of the plane that each pixel sees.
+
+        Args:
+            linear: (h, w, 3) linear light of `region`, changed in place.
+            region: pixels of the frame.
+            camera_from_probe: the pose.
+            ratio: (side, side, 4) irradiance with the object over irradiance without, and an unused column.
+        """
+        rotation, plane = camera_from_probe.rotation, self._plane
+        if linear.shape != (region.size[1], region.size[0], 3) or ratio.shape != (plane.side, plane.side, 4):
+            raise ValueError(
+                f"linear {linear.shape} or ratio {ratio.shape} do not fit {region} and {plane.side} texels"
+            )
+        homography = np.column_stack([rotation[:, 0], rotation[:, 1], camera_from_probe.translation])
+        try:
+            texel_from_ray = self._texel_from_plane @ np.linalg.inv(homography)
+        except np.linalg.LinAlgError:
+            return  # seen edge-on the plane has no pixels
+        plane.texel_from_ray[:] = texel_from_ray.reshape(-1).tolist()
+        plane.x0, plane.y0 = region.x0, region.y0
+        plane.width, plane.height = region.size
+        plane.linear, plane.ratio = address(linear, np.float32), address(ratio, np.float32)
+        _native.shade_plane(ctypes.byref(plane))
 
 
 def cover(linear: Image, x: int, y: int, drawn: Image) -> None:
     """Lay premultiplied radiance and coverage (h, w, 4) over linear light, in place, its top left pixel at (x, y)."""
-    _cover(linear[y : y + drawn.shape[0], x : x + drawn.shape[1]], drawn)
-
-
-@njit(cache=True, nogil=True)
-def _cover(linear, drawn):  # type: ignore[no-untyped-def]
-    for y in range(linear.shape[0]):
-        for x in range(linear.shape[1]):
-            if drawn[y, x, 3] > 0.0:
-                left = np.float32(1.0) - drawn[y, x, 3]
-                for c in range(3):
-                    linear[y, x, c] = linear[y, x, c] * left + drawn[y, x, c]
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _multiply(linear, rays, texel_from_ray, ratio):  # type: ignore[no-untyped-def]
-    """Bilinear ratio at each pixel's point of the plane; outside of the map, and above the horizon, 1."""
-    side = ratio.shape[0]
-    m = texel_from_ray
-    for y in range(linear.shape[0]):
-        for x in range(linear.shape[1]):
-            rx, ry = rays[y, x, 0], rays[y, x, 1]
-            inverse_depth = m[2, 0] * rx + m[2, 1] * ry + m[2, 2]
-            if inverse_depth <= 0.0:
-                continue
-            u = (m[0, 0] * rx + m[0, 1] * ry + m[0, 2]) / inverse_depth
-            v = (m[1, 0] * rx + m[1, 1] * ry + m[1, 2]) / inverse_depth
-            if not (0.0 <= u < side - 1 and 0.0 <= v < side - 1):
-                continue
-            column, row = int(u), int(v)
-            fu, fv = u - np.float32(column), v - np.float32(row)
-            for c in range(3):
-                upper = ratio[row, column, c] * (np.float32(1.0) - fu) + ratio[row, column + 1, c] * fu
-                lower = ratio[row + 1, column, c] * (np.float32(1.0) - fu) + ratio[row + 1, column + 1, c] * fu
-                linear[y, x, c] *= upper * (np.float32(1.0) - fv) + lower * fv
+    (height, width), (rows, columns) = drawn.shape[:2], linear.shape[:2]
+    if x < 0 or y < 0 or x + width > columns or y + height > rows:
+        raise ValueError(f"a picture of {width}x{height} at ({x}, {y}) leaves the region of {columns}x{rows} pixels")
+    start = address(linear, np.float32) + 12 * (y * columns + x)
+    _native.cover(start, columns, address(drawn, np.float32), width, height)

@@ -15,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arlight.estimation.radiance_prior import hemisphere_points, predictor, radiance_covariance, received_operator
+from arlight.estimation.radiance_prior import (
+    observed_covariance,
+    radiance_covariance,
+    received_operator,
+    sky_covariance,
+    sky_directions,
+)
 from arlight.optics import Slab
 
 Array = NDArray[np.float64]
@@ -31,6 +37,9 @@ class Reconstruction:
     """(n, m) matrix R: radiance from `directions` per coefficient [1/sr]."""
     prior_weights: Array
     """(n, m) A^T (A C A^T + S)^-1, from which the row of any direction follows."""
+    independent: Array
+    """(m, m) lower triangle L, L L^T = A C A^T + S: coefficients are L times independent parts of unit variance, of which
+    the first coefficients tell the first."""
     surroundings_albedo: float
     """Assumed albedo of what lies around and under the object, in [0, 1]."""
 
@@ -49,6 +58,15 @@ class Reconstruction:
         """(m,) assumed radiance from every direction below the horizon."""
         return self.surroundings_albedo / np.pi * self.upward_irradiance_row
 
+    def completed(self, packed: ArrayLike) -> Array:
+        """All coefficients (m, 3) that the first ones (k, 3) predict; theirs stay as they are.
+
+        What is reconstructed of these is the best estimate from the first ones alone, as `reconstruct` for them has it.
+        """
+        given = np.asarray(packed, float)
+        k = len(given)
+        return self.independent[:, :k] @ np.linalg.solve(self.independent[:k, :k], given)
+
     def radiance_rows(self, directions: ArrayLike) -> Array:
         """Radiance rows (d, m) of any unit directions (d, 3); the ground's below the horizon."""
         w = np.asarray(directions, float)
@@ -66,9 +84,7 @@ class Reconstruction:
         return sky + ground * self.ground_radiance_row
 
 
-def reconstruct(
-    slab: Slab, frequencies: ArrayLike, surroundings_albedo: float = 0.3, direction_count: int = 2048
-) -> Reconstruction:
+def reconstruct(slab: Slab, frequencies: ArrayLike, surroundings_albedo: float = 0.3) -> Reconstruction:
     """Build R for a sheet's glass and a set of frequencies.
 
     Args:
@@ -76,13 +92,14 @@ def reconstruct(
         frequencies: (k, 2) integers, (0, 0) first.
         surroundings_albedo: assumed albedo of the surroundings, in [0, 1]; 0.3 lies between a printed sheet, half of
             it dark, and a light table.
-        direction_count: quadrature points on the hemisphere.
     """
     if not 0.0 <= surroundings_albedo <= 1.0:
         raise ValueError(f"surroundings_albedo must lie in [0, 1], found {surroundings_albedo}")
-    directions = hemisphere_points(direction_count)
-    operator = received_operator(slab, frequencies, directions, np.full(direction_count, 2.0 * np.pi / direction_count))
-    weights = predictor(operator, directions)
-    return Reconstruction(
-        directions, radiance_covariance(directions, directions) @ weights, weights, surroundings_albedo
-    )
+    directions, solid_angle_sr = sky_directions()
+    operator = received_operator(slab, frequencies, directions, solid_angle_sr)
+    told = sky_covariance() @ operator.T
+    observed = observed_covariance(operator @ told)
+    weights = np.asarray(np.linalg.solve(observed, operator).T, float)
+    rows = np.asarray(np.linalg.solve(observed, told.T).T, float)
+    independent = np.asarray(np.linalg.cholesky(observed), float)
+    return Reconstruction(directions, rows, weights, independent, surroundings_albedo)

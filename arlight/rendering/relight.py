@@ -9,13 +9,15 @@ from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
-from arlight.rendering.composite import cover, shade_plane
-from arlight.rendering.draw import ObjectRenderer
+from arlight.rendering.composite import PlaneShader, cover
 from arlight.rendering.gloss import gloss_rows
+from arlight.rendering.light_rows import LightRows
 from arlight.rendering.mesh import Mesh
-from arlight.rendering.projection import View, project, union
+from arlight.rendering.projection import Projector, View, union
+from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.settings import RelightSettings
+from arlight.rendering.shadow import dark_texels, irradiance_ratio
 from arlight.rendering.transfer import precompute_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
@@ -25,13 +27,16 @@ _DARKENING = 0.008
 
 
 class ObjectDrawer(Protocol):
-    """What draws the object; belongs to the thread that made it."""
+    """What draws the object; one that uses OpenGL belongs to the thread that made it."""
 
     def draw(self, view: View, packed: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Linear premultiplied radiance and coverage (h, w, 4) of the view's region, by packed coefficients (m, 3)."""
+        """Linear premultiplied radiance and coverage (h, w, 4) of the view's region, by packed coefficients (m, 3).
+
+        It holds until the next call.
+        """
 
     def release(self) -> None:
-        """Give the context back."""
+        """Give back what it holds."""
 
 
 class ProbeGlass(Protocol):
@@ -49,8 +54,8 @@ class ProbeGlass(Protocol):
 class Relighter:
     """An object on the sheet, ready to be lit: everything that does not depend on the light or the view is done once.
 
-    `render` opens an OpenGL context in the thread that first calls it and refuses other threads from then on;
-    building it in one thread and rendering in another is fine.
+    It may be built in one thread and used in another, but not by two at once. With a renderer that uses OpenGL the
+    thread that first calls `render` owns the context, and others are refused from then on.
     """
 
     def __init__(
@@ -62,7 +67,7 @@ class Relighter:
         progress: Progress | None = None,
         order: int | None = None,
     ) -> None:
-        """Cast the object's shadows and fold them into matrices; takes seconds.
+        """Cast the object's shadows and fold them into matrices.
 
         Args:
             mesh: any object; it is scaled and placed by the settings.
@@ -85,6 +90,11 @@ class Relighter:
         self.mesh = mesh.placed(s.size_mm, s.position_mm, s.yaw_deg)
         self._reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
         self.transfer = precompute_transfer(self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress)
+        shadow = self.transfer.shadow
+        self._plane_rows = LightRows([shadow.hidden_rows, shadow.open_row[None]], self._reconstruction.independent)
+        self._plane_shader = PlaneShader(camera, shadow.grid)
+        self._projector = Projector(camera)
+        self._vertices = np.ascontiguousarray(self.mesh.vertices_mm, np.float32)
         self._opened: ObjectDrawer | None = None
 
     def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
@@ -93,82 +103,84 @@ class Relighter:
         Args:
             frame: the recorded frame.
             camera_from_probe: the pose; None where the sheet is lost.
-            lighting: the light; None before the first estimate.
+            lighting: the light; None before the first estimate. Of the relighter's frequencies it may have the first
+                alone, which costs less.
 
         Returns:
             A new frame; the one given where pose or light is missing: nothing is drawn that is not lit by measurement.
 
         Raises:
             ValueError: frame or lighting do not fit what the relighter was made for.
-            RuntimeError: called from another thread than before.
+            RuntimeError: called from another thread than before, with a renderer that uses OpenGL.
         """
         if camera_from_probe is None or lighting is None:
             return frame
         if frame.size != self._camera.image_size:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
         packed = self._packed(lighting)
-        ratio = self.transfer.shadow.ratio(packed)
+        hidden, open_plane = self._plane_rows.light(packed)
+        ratio = irradiance_ratio(hidden, open_plane[:, 0], self.transfer.shadow.grid.side)
         view = self._view(camera_from_probe)
         region = union(None if view is None else view.region, self._shadow_region(camera_from_probe, ratio))
         if region is None:
             return frame
         linear = frame.linear_rgb(region)
-        shade_plane(linear, region, self._camera, camera_from_probe, self.transfer.shadow.grid, ratio)
+        self._plane_shader.shade(linear, region, camera_from_probe, ratio)
         if view is not None:
-            drawn = self._drawer().draw(view, packed)
-            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, drawn)
+            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, self._draw(view, packed))
         return frame.with_linear_rgb(region, linear)
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
         view = self._view(camera_from_probe)
-        return None if view is None else (view.region, self._drawer().draw(view, self._packed(lighting)))
+        return None if view is None else (view.region, self._draw(view, self._packed(lighting)).copy())
 
     def release(self) -> None:
-        """Close the OpenGL context, from the thread that renders; it is opened again when needed."""
+        """Give back what drawing holds, from the thread that renders; it is made again when needed."""
         if self._opened is not None:
             self._opened.release()
             self._opened = None
 
     def _view(self, camera_from_probe: Pose) -> View | None:
-        projected = project(self._camera, camera_from_probe, self.mesh.vertices_mm)
+        projected = self._projector.project(camera_from_probe, self._vertices)
         region = projected.region()
         return None if region is None else View(camera_from_probe, projected, region)
 
-    def _drawer(self) -> ObjectDrawer:
+    def _draw(self, view: View, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         if self._opened is None:
-            s = self.settings
-            if s.renderer == "pyrender":
-                # here, because what it needs takes long to load and it is seldom asked for
-                from arlight.rendering.pyrender_drawer import PyrenderDrawer
+            self._opened = self._open()
+        if not isinstance(self._opened, RasterRenderer) and len(packed) < len(self._reconstruction.independent):
+            packed = self._reconstruction.completed(packed).astype(np.float32)
+        return self._opened.draw(view, packed)
 
-                self._opened = PyrenderDrawer(self.mesh, self._reconstruction, self._camera, s.roughness)
-            else:
-                rows = gloss_rows(self._reconstruction, s.roughness)
-                self._opened = ObjectRenderer(
-                    self.mesh, self.transfer, rows, s.roughness, s.normal_reflectance, s.supersampling
-                )
-        return self._opened
+    def _open(self) -> ObjectDrawer:
+        s = self.settings
+        # the others here, because what they need takes long to load
+        if s.renderer == "pyrender":
+            from arlight.rendering.pyrender_drawer import PyrenderDrawer
+
+            return PyrenderDrawer(self.mesh, self._reconstruction, self._camera, s.roughness)
+        rows = gloss_rows(self._reconstruction, s.roughness)
+        material = (rows, s.roughness, s.normal_reflectance, s.supersampling)
+        if s.renderer == "moderngl":
+            from arlight.rendering.draw import ObjectRenderer
+
+            return ObjectRenderer(self.mesh, self.transfer, *material)
+        return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent)
 
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
-        if not np.array_equal(lighting.frequencies, self._frequencies):
+        count = len(lighting.frequencies)
+        if not np.array_equal(lighting.frequencies, self._frequencies[:count]):
             raise ValueError(
-                f"the lighting has {len(lighting.frequencies)} frequencies that are not the relighter's "
+                f"the lighting has {count} frequencies that are not the first of the relighter's "
                 f"{len(self._frequencies)}; make it with the probe and the order that the lighting was estimated with"
             )
         return pack_real(lighting.coefficients).astype(np.float32)
 
     def _shadow_region(self, camera_from_probe: Pose, ratio: NDArray[np.float32]) -> Region | None:
         """Pixels that see the darkened part of the plane."""
-        dark = np.any(ratio < 1.0 - _DARKENING, axis=2)
-        rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
-        if len(rows) == 0:
+        box = dark_texels(ratio, _DARKENING)
+        if box is None:
             return None
-        grid = self.transfer.shadow.grid
-        x = grid.corner_mm[0] + np.array([columns[0] - 0.5, columns[-1] + 1.5]) * grid.texel_mm
-        y = grid.corner_mm[1] + np.array([rows[0] - 0.5, rows[-1] + 1.5]) * grid.texel_mm
-        # the outline in steps: a lens bends it
-        share = np.linspace(0.0, 1.0, 9)
-        along_x, along_y = x[0] + share * (x[1] - x[0]), y[0] + share * (y[1] - y[0])
-        outline = [(px, py, 0.0) for px in along_x for py in y] + [(px, py, 0.0) for py in along_y for px in x]
-        return project(self._camera, camera_from_probe, outline).region(margin_px=1)
+        outline = self.transfer.shadow.grid.outline_mm(*box)
+        return self._projector.project(camera_from_probe, outline).region(margin_px=1)

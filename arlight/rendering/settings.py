@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-RendererName = Literal["moderngl", "pyrender"]
+RendererName = Literal["native", "moderngl", "pyrender"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,5 +28,6 @@ class RelightSettings:
     """Side of the map of the shadow on the sheet."""
     supersampling: int = 2
     """Samples along a pixel's side."""
-    renderer: RendererName = "moderngl"
-    """`moderngl`: precomputed transfer; `pyrender`: the light as a few directional lights with shadow maps, slow."""
+    renderer: RendererName = "native"
+    """`native`: precomputed transfer, drawn by compiled code; `moderngl`: the same by OpenGL, with the gloss of every
+    pixel; `pyrender`: the light as a few directional lights with shadow maps, slow."""

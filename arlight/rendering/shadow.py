@@ -1,16 +1,23 @@
 """The shadow on the sheet: what the object takes from the irradiance of the plane z = 0, linear in the light."""
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from arlight.native import address, library
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.reconstruction import Reconstruction
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.float32]
 
+_native = library(__file__, "shadow")
+_native.irradiance_ratio.restype = _native.dark_box.restype = None
+_pointer, _integer = ctypes.c_void_p, ctypes.c_int64
+_native.irradiance_ratio.argtypes = [_pointer, _integer, _pointer, _integer, _pointer]
+_native.dark_box.argtypes = [_pointer, _integer, ctypes.c_double, _pointer]
 _REACH_HEIGHTS = 1.0
 """How far the map reaches beyond the object, in heights of the object: light above 45 degrees stays inside."""
 _FADE = 0.35
@@ -33,6 +40,16 @@ class PlaneGrid:
         steps = (np.arange(self.side) + 0.5) * self.texel_mm
         x, y = np.meshgrid(self.corner_mm[0] + steps, self.corner_mm[1] + steps)
         return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+
+    def outline_mm(self, first_column: int, last_column: int, first_row: int, last_row: int) -> Rows:
+        """Outline (36, 3) of what a range of texels reaches in bilinear lookup; in steps, because a lens bends it."""
+        share = np.linspace(0.0, 1.0, 9)
+        x = self.corner_mm[0] + (first_column - 0.5 + share * (last_column - first_column + 2.0)) * self.texel_mm
+        y = self.corner_mm[1] + (first_row - 0.5 + share * (last_row - first_row + 2.0)) * self.texel_mm
+        outline = np.zeros((4, 9, 3), np.float32)
+        outline[:2, :, 0], outline[0, :, 1], outline[1, :, 1] = x, y[0], y[-1]
+        outline[2:, :, 1], outline[2, :, 0], outline[3, :, 0] = y, x[0], x[-1]
+        return outline.reshape(-1, 3)
 
     def texel_of(self, points_mm: ArrayLike) -> Array:
         """(..., 2) fractional (column, row) of points (..., >= 2) of the plane; texel centres lie at integers."""
@@ -71,12 +88,8 @@ class PlaneShadow:
             (side, side, 3) in [0, 1]; 1 where the open plane itself would be dark.
         """
         light = np.asarray(packed, np.float32)
-        open_plane = self.open_row @ light
-        usable = open_plane > 0.0
-        hidden = (self.hidden_rows @ light) / np.where(usable, open_plane, 1.0)
-        # the reconstructed radiance may dip below 0 somewhere, which would brighten the plane
-        ratio: Rows = np.clip(np.float32(1.0) - np.where(usable, hidden, np.float32(0.0)), 0.0, 1.0)
-        return ratio.reshape(self.grid.side, self.grid.side, -1)
+        hidden, open_plane = np.ascontiguousarray((self.hidden_rows @ light).T), self.open_row @ light
+        return irradiance_ratio(hidden, open_plane, self.grid.side)[..., :3]
 
     def openness_along(self, points_mm: Array, direction: Array) -> Rows:
         """Openness (p,) of the ground where rays from points (p, 3) along a downward direction (3,) meet it."""
@@ -85,6 +98,31 @@ class PlaneShadow:
         last = self.grid.side - 1
         inside = (column >= 0) & (row >= 0) & (column <= last) & (row <= last)
         return np.where(inside, self.openness[np.clip(row, 0, last), np.clip(column, 0, last)], np.float32(1.0))
+
+
+def irradiance_ratio(hidden: Rows, open_plane: Rows, side: int) -> Rows:
+    """The share of the open plane's irradiance (3,) that is left where (3, side * side) of it is hidden.
+
+    Returns:
+        (side, side, 4): three colours in [0, 1], and the least of them; 1 where the open plane itself is dark.
+    """
+    if hidden.shape != (3, side * side) or hidden.strides[1] != 4 or hidden.dtype != np.float32:
+        raise ValueError(f"hidden must be rows of float32, (3, {side * side}), found {hidden.dtype} {hidden.shape}")
+    open_three = np.ascontiguousarray(open_plane, np.float32)
+    ratio = np.empty((side, side, 4), np.float32)
+    _native.irradiance_ratio(
+        hidden.ctypes.data, hidden.strides[0] // 4, address(open_three, np.float32), side * side,
+        address(ratio, np.float32),
+    )  # fmt: skip
+    return ratio
+
+
+def dark_texels(ratio: Rows, darkening: float) -> tuple[int, int, int, int] | None:
+    """First and last column, first and last row of the texels (side, side, 4) darkened by more than a share."""
+    box = (ctypes.c_int64 * 4)()
+    _native.dark_box(address(ratio, np.float32), ratio.shape[0], 1.0 - darkening, box)
+    first_column, last_column, first_row, last_row = box
+    return None if last_row < 0 else (first_column, last_column, first_row, last_row)
 
 
 def plane_shadow(

@@ -1,9 +1,15 @@
 import numpy as np
 import pytest
 
-from arlight.rendering.composite import cover, shade_plane
+from arlight.camera import Camera, Pose
+from arlight.rendering.composite import PlaneShader, cover
 from arlight.rendering.shadow import PlaneGrid
 from arlight.video.frame import Region
+
+
+def shade_plane(linear, region, camera, pose, grid, ratio):
+    padded = np.concatenate([ratio, np.zeros((*ratio.shape[:2], 1))], axis=2).astype(np.float32)
+    PlaneShader(camera, grid).shade(linear, region, pose, padded)
 
 
 def ramp_ratio(grid):
@@ -66,3 +72,42 @@ def test_cover_is_over_in_linear_light():
     assert np.allclose(linear[4, 6], [0.4, 0.3, 0.5])
     linear[3, 4] = linear[4, 6] = 0.4
     assert np.all(linear == np.float32(0.4))
+
+
+def test_cover_refuses_what_leaves_the_region():
+    linear, drawn = np.zeros((6, 8, 3), np.float32), np.ones((2, 3, 4), np.float32)
+    for x, y in ((-1, 0), (0, -1), (6, 0), (0, 5)):
+        with pytest.raises(ValueError, match="leaves the region"):
+            cover(linear, x, y, drawn)
+    assert not linear.any()
+
+
+def test_every_pixel_of_a_bent_picture_sees_the_plane_where_the_lens_says(camera, looking_down):
+    """Against the exact ray of every pixel, at a strong barrel, to the picture's corners."""
+    strong = Camera(camera.image_size, camera.camera_matrix, np.array([-0.3, 0.1, 0.004, -0.005, -0.01]))
+    grid, pose = PlaneGrid((-400.0, -400.0), 8.0, 100), looking_down(20.0, 300.0)
+    linear = np.ones((240, 320, 3), np.float32)
+    p = grid.texel_centres_mm()
+    ramp = np.stack([0.5 + 0.001 * p[:, 0], 0.5 + 0.001 * p[:, 1], np.ones(len(p))], -1).reshape(100, 100, 3)
+    shade_plane(linear, Region(0, 0, 320, 240), strong, pose, grid, ramp)
+    x, y = np.meshgrid(np.arange(320), np.arange(240))
+    rays = np.concatenate([strong.rays(np.stack([x, y], -1).reshape(-1, 2)), np.ones((320 * 240, 1))], axis=1)
+    toward = rays @ pose.rotation
+    seen = pose.camera_centre_mm - toward * (pose.camera_centre_mm[2] / toward[:, 2])[:, None]
+    inside = np.all((grid.texel_of(seen) >= 0.0) & (grid.texel_of(seen) < 99.0), axis=1)
+    expected = np.where(inside[:, None], 0.5 + 0.001 * seen[:, :2], 1.0).reshape(240, 320, 2)
+    assert inside.mean() > 0.9
+    assert np.quantile(np.abs(linear[..., :2] - expected), 0.999) < 1e-4
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e30])
+def test_impossible_poses_and_edges_of_the_map_touch_no_foreign_memory(camera, pose, bad):
+    grid = PlaneGrid((-10.0, -10.0), 1.0, 20)
+    linear = np.ones((50, 60, 3), np.float32)
+    for broken in (
+        Pose(pose.rotation, np.array([0.0, bad, 300.0])),
+        Pose(np.full((3, 3), bad), pose.translation),
+        Pose(np.zeros((3, 3)), np.zeros(3)),
+    ):
+        shade_plane(linear, Region(7, 9, 67, 59), camera, broken, grid, np.ones((20, 20, 3)))
+    assert np.all(linear == 1.0)

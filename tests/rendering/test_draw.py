@@ -12,6 +12,7 @@ from arlight.rendering.gloss import GLOSS_SIDE
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.mesh_file import from_trimesh
 from arlight.rendering.projection import View, project
+from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.shadow import PlaneGrid, PlaneShadow
 from arlight.rendering.transfer import Transfer
 
@@ -40,18 +41,28 @@ def card(size_mm=60.0, colour=(0.9, 0.5, 0.2), height_mm=0.0):
     )
 
 
-def renderer_of(mesh, mirrored=0.0, reflectance=0.0, supersampling=2, roughness=0.4):
-    gloss = np.full((GLOSS_SIDE**2, 1), mirrored, np.float32)
-    return ObjectRenderer(mesh, plain_transfer(mesh), gloss, roughness, reflectance, supersampling)
+@pytest.fixture(params=[RasterRenderer, ObjectRenderer])
+def renderer_of(request):
+    """Makes either renderer: what follows holds for both."""
+
+    def make(mesh, mirrored=0.0, reflectance=0.0, supersampling=2, roughness=0.4):
+        gloss = np.full((GLOSS_SIDE**2, 1), mirrored, np.float32)
+        return request.param(mesh, plain_transfer(mesh), gloss, roughness, reflectance, supersampling)
+
+    return make
+
+
+def opengl_renderer_of(mesh):
+    return ObjectRenderer(mesh, plain_transfer(mesh), np.zeros((GLOSS_SIDE**2, 1), np.float32), 0.4, 0.0)
 
 
 def drawn(renderer, mesh, camera, pose, light=(1.0, 1.0, 1.0)):
     projected = project(camera, pose, mesh.vertices_mm)
     view = View(pose, projected, projected.region())
-    return view.region, renderer.draw(view, np.array([light], np.float32))
+    return view.region, renderer.draw(view, np.array([light], np.float32)).copy()
 
 
-def test_radiance_is_reflectance_times_light_and_covers_what_the_camera_sees(camera, pose):
+def test_radiance_is_reflectance_times_light_and_covers_what_the_camera_sees(renderer_of, camera, pose):
     mesh = card()
     region, image = drawn(renderer_of(mesh), mesh, camera, pose, (1.0, 2.0, 4.0))
     assert image.shape == (region.size[1], region.size[0], 4)
@@ -66,7 +77,7 @@ def test_radiance_is_reflectance_times_light_and_covers_what_the_camera_sees(cam
 
 
 @pytest.mark.parametrize("which", ["camera", "lens_camera"])
-def test_the_picture_lies_where_the_camera_model_puts_it(request, which, pose):
+def test_the_picture_lies_where_the_camera_model_puts_it(renderer_of, request, which, pose):
     camera = request.getfixturevalue(which)
     small = card(3.0)
     for place in ([0.0, 0.0, 0.0], [45.0, 25.0, 5.0], [-50.0, -30.0, 0.0]):
@@ -78,7 +89,7 @@ def test_the_picture_lies_where_the_camera_model_puts_it(request, which, pose):
         assert np.allclose(middle, camera.project(pose, [place])[0], atol=0.1)
 
 
-def test_nearer_surfaces_cover_farther_ones(camera, pose):
+def test_nearer_surfaces_cover_farther_ones(renderer_of, camera, pose):
     low, high = card(60.0, (1.0, 0.0, 0.0)), card(20.0, (0.0, 1.0, 0.0), 10.0)
     mesh = Mesh(
         np.concatenate([high.vertices_mm, low.vertices_mm]),
@@ -91,7 +102,7 @@ def test_nearer_surfaces_cover_farther_ones(camera, pose):
     assert np.allclose(image[y - region.y0, x - region.x0], [0.0, 1.0, 0.0, 1.0])
 
 
-def test_closed_and_open_meshes_show_the_same_outside(camera, pose):
+def test_closed_and_open_meshes_show_the_same_outside(renderer_of, camera, pose):
     box = from_trimesh(trimesh.creation.box(extents=(30.0, 20.0, 10.0)))
     opened = Mesh(box.vertices_mm, box.normals, box.faces, box.base_colour, closed=False)
     assert box.closed
@@ -100,14 +111,14 @@ def test_closed_and_open_meshes_show_the_same_outside(camera, pose):
     assert np.allclose(images[0], images[1], atol=1e-6)
 
 
-def test_gloss_keeps_the_energy_of_uniform_light(camera, pose):
+def test_gloss_keeps_the_energy_of_uniform_light(renderer_of, camera, pose):
     """A white varnished card in a white world stays white: what the varnish mirrors, the body does not get."""
     mesh = card(colour=(1.0, 1.0, 1.0))
     _, image = drawn(renderer_of(mesh, mirrored=1.0, reflectance=0.04), mesh, camera, pose)
     assert np.allclose(image[image[..., 3] == 1.0], 1.0, atol=1e-4)
 
 
-def test_gloss_grows_toward_grazing_views(camera, looking_down):
+def test_gloss_grows_toward_grazing_views(renderer_of, camera, looking_down):
     mesh = card(colour=(0.0, 0.0, 0.0))
     renderer = renderer_of(mesh, mirrored=1.0, reflectance=0.04)
     shares = []
@@ -118,7 +129,7 @@ def test_gloss_grows_toward_grazing_views(camera, looking_down):
     assert np.all(np.diff(shares) > 0)
 
 
-def test_texture_is_upright_and_decoded(camera, looking_down):
+def test_texture_is_upright_and_decoded(renderer_of, camera, looking_down):
     pixels = np.zeros((8, 8, 3), np.uint8)
     pixels[:4, 4:] = [188, 0, 0]
     pixels[4:, :4] = [0, 188, 0]
@@ -135,7 +146,7 @@ def test_texture_is_upright_and_decoded(camera, looking_down):
 
 def test_another_thread_is_refused(camera, pose):
     mesh = card()
-    renderer = renderer_of(mesh)
+    renderer = opengl_renderer_of(mesh)
     caught = []
 
     def attempt():
@@ -153,7 +164,7 @@ def test_another_thread_is_refused(camera, pose):
 
 def test_another_context_in_between_does_no_harm(camera, pose):
     mesh = card()
-    renderer = renderer_of(mesh)
+    renderer = opengl_renderer_of(mesh)
     _, before = drawn(renderer, mesh, camera, pose)
     other = create_context()
     _, after = drawn(renderer, mesh, camera, pose)
@@ -161,7 +172,7 @@ def test_another_context_in_between_does_no_harm(camera, pose):
     assert np.array_equal(before, after)
 
 
-def test_viewports_of_changing_size(camera, looking_down):
+def test_viewports_of_changing_size(renderer_of, camera, looking_down):
     mesh = card()
     renderer = renderer_of(mesh)
     for distance in (300.0, 150.0, 600.0):

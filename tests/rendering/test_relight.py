@@ -137,9 +137,9 @@ def test_a_lens_bends_object_and_shadow_alike(probe, lens_camera, pose, lighting
 
 def test_other_frequencies_and_sizes_are_refused(relighter, pose, lighting_of, environment):
     lighting = lighting_of(environment)
-    fewer = replace(lighting, frequencies=lighting.frequencies[:5], coefficients=lighting.coefficients[:5])
+    others = replace(lighting, frequencies=lighting.frequencies[5:], coefficients=lighting.coefficients[5:])
     with pytest.raises(ValueError, match="frequencies"):
-        relighter.render(frame_of(), pose, fewer)
+        relighter.render(frame_of(), pose, others)
     with pytest.raises(ValueError, match="pixels"):
         relighter.render(frame_of(size=(64, 48)), pose, lighting)
 

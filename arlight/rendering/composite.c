@@ -1,0 +1,78 @@
+/* Differential rendering in linear light: the plane darkens by a ratio, the object covers. */
+#include "native.h"
+
+enum { CELL = 8 }; /* pixels between two nodes of the net of rays, as in composite.py */
+
+typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
+
+typedef struct {
+    float *linear;      /* (height, width, 3) a region of the frame */
+    const float *rays;  /* (node_rows, node_columns, 2) undistorted rays (x, y, 1) at every CELL-th pixel */
+    const float *ratio; /* (side, side, 4) red, green, blue, unused */
+    int64_t x0, y0, width, height, node_columns, side;
+    double texel_from_ray[9]; /* homogeneous (column, row) of the plane's point that a ray meets */
+} Plane;
+
+/* Homogeneous texels (u, v, w) at two neighbouring nodes of a row of pixels: the first, and the change to the second. */
+static inline void texels_of_cell(const Plane *p, int64_t column, int64_t y, float start[3], float change[3])
+{
+    float below = (float)(y % CELL) / CELL;
+    const float *upper = p->rays + 2 * (y / CELL * p->node_columns + column), *lower = upper + 2 * p->node_columns;
+    float x0 = upper[0] + below * (lower[0] - upper[0]), y0 = upper[1] + below * (lower[1] - upper[1]);
+    float x1 = upper[2] + below * (lower[2] - upper[2]), y1 = upper[3] + below * (lower[3] - upper[3]);
+    for (int i = 0; i < 3; i++) {
+        const double *m = p->texel_from_ray + 3 * i;
+        start[i] = (float)(m[0] * x0 + m[1] * y0 + m[2]);
+        change[i] = (float)(m[0] * (x1 - x0) + m[1] * (y1 - y0));
+    }
+}
+
+/* Multiply a pixel by the bilinear ratio at a texel that lies on the map. */
+static inline void darken(const Plane *p, float *pixel, float u, float v)
+{
+    int32_t column = (int32_t)u, row = (int32_t)v;
+    const Four *texel = (const Four *)p->ratio + row * p->side + column;
+    float fu = u - (float)column, fv = v - (float)row;
+    Four upper = texel[0] + fu * (texel[1] - texel[0]);
+    Four lower = texel[p->side] + fu * (texel[p->side + 1] - texel[p->side]);
+    Four ratio = upper + fv * (lower - upper);
+    pixel[0] *= ratio[0], pixel[1] *= ratio[1], pixel[2] *= ratio[2];
+}
+
+/* Multiply by the ratio at each pixel's point of the plane; outside of the map, and above the horizon, by nothing. */
+EXPORT HOT void shade_plane(const Plane *p)
+{
+    float last = (float)(p->side - 1);
+    for (int64_t row = 0; row < p->height; row++) {
+        int64_t y = p->y0 + row, end = p->x0 + p->width;
+        float *pixels = p->linear + 3 * (row * p->width - p->x0);
+        for (int64_t cell = p->x0 / CELL; cell * CELL < end; cell++) {
+            float start[3], change[3], u[CELL], v[CELL];
+            texels_of_cell(p, cell, y, start, change);
+#pragma GCC unroll 1
+            for (int i = 0; i < CELL; i++) {
+                float share = (float)i / CELL, w = start[2] + share * change[2], inverse = 1.0f / w;
+                float across = (start[0] + share * change[0]) * inverse;
+                u[i] = w > 0.0f ? across : -1.0f;
+                v[i] = (start[1] + share * change[1]) * inverse;
+            }
+            int64_t first = p->x0 - cell * CELL, stop = end - cell * CELL;
+            for (int64_t i = first > 0 ? first : 0; i < (stop < CELL ? stop : CELL); i++)
+                if (u[i] >= 0.0f && u[i] < last && v[i] >= 0.0f && v[i] < last)
+                    darken(p, pixels + 3 * (cell * CELL + i), u[i], v[i]);
+        }
+    }
+}
+
+/* Lay radiance times coverage, and coverage, (height, width, 4) over linear light whose rows are `stride` pixels long. */
+EXPORT HOT void cover(float *linear, int64_t stride, const float *drawn, int64_t width, int64_t height)
+{
+    for (int64_t row = 0; row < height; row++)
+        for (int64_t column = 0; column < width; column++) {
+            const float *over = drawn + 4 * (row * width + column);
+            float *pixel = linear + 3 * (row * stride + column), left = 1.0f - over[3];
+            if (over[3] > 0.0f)
+                for (int channel = 0; channel < 3; channel++)
+                    pixel[channel] = pixel[channel] * left + over[channel];
+        }
+}
