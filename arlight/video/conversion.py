@@ -3,16 +3,21 @@
 The decoder library's own RGB conversion rounds dark values down by about a level; radiometry cannot afford it.
 """
 
-from functools import cache
+from ctypes import byref, c_int32, c_void_p
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.color import Transfer, encoded_from_linear, linear_from_encoded
-from arlight.video import kernels
-from arlight.video.chroma_grid import AxisGrid, axis_grid
+from arlight.native import library
+from arlight.video.curves import IDENTITY, TABLE_SIZE, Curve, decoding_table, encoding_table
+from arlight.video.layout import POINTERS, BoxBounds, CurveTable, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
+
+__all__ = [
+    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "converted", "decoding_table", "encoded_rgb",
+    "encoding_table", "full_range_luma", "linear_luma", "linear_rgb", "replaced", "with_chroma",
+]  # fmt: skip
 
 Upsampling = Literal["guided", "bilinear"]
 """How chroma stored at a lower resolution is brought to every pixel, at its exact position.
@@ -26,24 +31,23 @@ Box = tuple[int, int, int, int]
 """x0, y0, x1, y1 of a region, half open [px]."""
 FloatImage = NDArray[np.float32]
 
-TABLE_SIZE = 4097
-"""Samples of a transfer curve over [0, 1]; linear interpolation between them is good to 1e-6 of full scale."""
-IDENTITY = np.array([0.0, 1.0, 1.0], np.float32)
-"""The table that only clamps."""
-
-
-@cache
-def decoding_table(transfer: Transfer) -> FloatImage:
-    """Linear light over encoded values in [0, 1]; the last entry stands twice (see `kernels`)."""
-    table = linear_from_encoded(np.linspace(0.0, 1.0, TABLE_SIZE), transfer)
-    return np.append(table, table[-1:])
-
-
-@cache
-def encoding_table(transfer: Transfer) -> FloatImage:
-    """Encoded values over the SQUARE ROOT of linear light, where every curve is smooth; the last entry stands twice."""
-    table = encoded_from_linear(np.linspace(0.0, 1.0, TABLE_SIZE) ** 2, transfer)
-    return np.append(table, table[-1:])
+_LAYOUT, _PICTURE, _BOX, _CURVE = (POINTERS[kind] for kind in (Layout, PictureCodes, BoxBounds, CurveTable))
+_colour, _replacement = library(__file__, "colour"), library(__file__, "replacement")
+_colour.read_colour.argtypes = [_LAYOUT, _PICTURE, _BOX, c_int32, _CURVE, c_void_p, c_void_p]
+_colour.read_luma.argtypes = [_LAYOUT, _PICTURE, _BOX, _CURVE, c_void_p]
+_colour.read_bytes.argtypes = [_LAYOUT, _PICTURE, c_int32, c_void_p, c_int32, c_int32, c_void_p, c_void_p]
+_replacement.replace_colour.argtypes = [_LAYOUT, _PICTURE, _PICTURE, _BOX, _BOX, c_void_p, c_void_p]
+_replacement.convert_colour.argtypes = [
+    _LAYOUT, _PICTURE, _LAYOUT, _PICTURE, _BOX, c_int32, c_void_p, c_void_p, c_void_p,
+]  # fmt: skip
+for _function in (
+    _colour.read_colour, _colour.read_luma, _colour.read_bytes, _replacement.replace_colour,
+    _replacement.convert_colour,
+):  # fmt: skip
+    _function.restype = None
+_READING_LINES = c_int32.in_dll(_colour, "reading_lines").value
+_WRITING_LINES = c_int32.in_dll(_replacement, "writing_lines").value
+_LINE_MARGIN = c_int32.in_dll(_colour, "line_margin").value
 
 
 def encoded_rgb(planes: Planes, format_: PixelFormat, box: Box, chroma: Upsampling = "guided") -> FloatImage:
@@ -60,21 +64,27 @@ def linear_luma(planes: Planes, format_: PixelFormat, box: Box) -> FloatImage:
     """Linear light (h, w) in [0, 1] of the encoded luma of a region."""
     table = decoding_table(format_.transfer)
     if format_.matrix == "rgb":
-        white = (np.float32(0.0), np.float32(1.0 / 255.0))
-        return kernels.through_table(full_range_luma(planes, format_), *box, *white, table)
-    return kernels.through_table(planes[0], *box, *_luma_scale(format_), table)
+        grey = PixelFormat("gray", True, 8, transfer=format_.transfer)
+        return _luma((full_range_luma(planes, format_),), grey, box, table)
+    return _luma(planes, format_, box, table)
 
 
 def full_range_luma(planes: Planes, format_: PixelFormat) -> NDArray[np.uint8]:
     """Encoded luma (h, w) as uint8, 0 black and 255 white; R'G'B' is weighted as BT.709 has it."""
+    weights = np.ones(1, np.float32)
     if format_.matrix == "rgb":
         kr, kb = LUMA_WEIGHTS["bt709"]
-        weights = (np.float32(kr), np.float32(1.0 - kr - kb), np.float32(kb))
-        red, green, blue = planes
-        return kernels.weighted_bytes(red, green, blue, weights, *_luma_scale(format_))
-    if format_.full_range and planes[0].dtype == np.uint8:
+        weights = np.array([kr, 1.0 - kr - kb, kb], np.float32)
+    elif format_.full_range and planes[0].dtype == np.uint8:
         return planes[0].view(np.uint8)
-    return kernels.to_bytes(planes[0], *_luma_scale(format_))
+    h, w = planes[0].shape
+    out, scratch = np.empty((h, w), np.uint8), np.empty(2 * w, np.float32)
+    codes = PictureCodes.of(planes[: len(weights)])
+    _colour.read_bytes(
+        byref(layout_of((w, h), format_)), byref(codes), len(weights), weights.ctypes.data, w, h, scratch.ctypes.data,
+        out.ctypes.data,
+    )  # fmt: skip
+    return out
 
 
 def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelFormat]:
@@ -89,22 +99,14 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
 
 def replaced(planes: Planes, format_: PixelFormat, box: Box, linear: FloatImage) -> Planes:
     """Planes with the linear light (h, w, 3) of a region replaced where it differs, rounded to the nearest codes."""
-    outer = _with_shared_chroma(box, planes[0].shape, format_)
-    own = _full_resolution(planes, format_, outer, "guided")
-    new = own.copy()
-    changed = kernels.replace_pixels(
-        new, box[0] - outer[0], box[1] - outer[1], linear, format_.rgb_from_ycc(), format_.ycc_from_rgb(),
-        decoding_table(format_.transfer), encoding_table(format_.transfer),
-    )  # fmt: skip
     out = tuple(plane.copy() for plane in planes)
-    luma, chroma = _code_scales(format_)
-    kernels.write_plane(out[0], outer[0], outer[1], new, 0, changed, *luma)
-    columns, rows = _grids(planes[0].shape, format_, outer)
-    for k in (1, 2):
-        if format_.matrix == "rgb":
-            kernels.write_plane(out[k], outer[0], outer[1], new, k, changed, *luma)
-        else:
-            kernels.write_chroma(out[k], own, new, k, changed, outer[0], outer[1], columns, rows, *chroma)
+    if linear.size:
+        around = _with_shared_chroma(box, planes[0].shape, format_)
+        scratch = _scratch(around, _WRITING_LINES)
+        _replacement.replace_colour(
+            byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(PictureCodes.of(out)),
+            byref(BoxBounds(*box)), byref(BoxBounds(*around)), linear.ctypes.data, scratch.ctypes.data,
+        )  # fmt: skip
     return out
 
 
@@ -118,18 +120,17 @@ def converted(planes: Planes, format_: PixelFormat, target: PixelFormat) -> Plan
     if format_ == target:
         return planes
     h, w = planes[0].shape
-    whole = (0, 0, w, h)
-    image = _full_resolution(planes, format_, whole, "bilinear" if format_.matrix == target.matrix else "guided")
-    if format_.matrix != target.matrix:
-        kernels.recombine(image, target.ycc_from_rgb() @ format_.rgb_from_ycc())
-    luma, chroma = _code_scales(target)
     chroma_shape = target.chroma_size((w, h))[::-1]
     out = tuple(np.empty(shape, target.dtype) for shape in ((h, w), chroma_shape, chroma_shape))
-    kernels.write_plane(out[0], 0, 0, image, 0, np.ones((h, w), np.uint8), *luma)
-    columns, rows = _grids((h, w), target, whole)
-    for k in (1, 2):
-        taps = (columns.taps, columns.tap_weights, rows.taps, rows.tap_weights)
-        kernels.average_chroma(image, k, *taps, out[k], *chroma)
+    same = format_.matrix == target.matrix
+    matrix = np.eye(3, dtype=np.float32) if same else target.ycc_from_rgb() @ format_.rgb_from_ycc()
+    whole, all_pixels = (0, 0, w, h), np.ones(w, np.float32)
+    scratch = _scratch(whole, _WRITING_LINES)
+    _replacement.convert_colour(
+        byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(_layout(out, target)),
+        byref(PictureCodes.of(out)), byref(BoxBounds(*whole)), not same, matrix.ctypes.data, all_pixels.ctypes.data,
+        scratch.ctypes.data,
+    )  # fmt: skip
     return out
 
 
@@ -139,46 +140,33 @@ def _with_shared_chroma(box: Box, shape: tuple[int, ...], format_: PixelFormat) 
     return max(x0 - mx, 0), max(y0 - my, 0), min(x1 + mx, shape[1]), min(y1 + my, shape[0])
 
 
-def _rgb(planes: Planes, format_: PixelFormat, box: Box, chroma: Upsampling, table: FloatImage) -> FloatImage:
+def _rgb(planes: Planes, format_: PixelFormat, box: Box, chroma: Upsampling, table: Curve) -> FloatImage:
     if format_.matrix == "gray":
-        grey = kernels.through_table(planes[0], *box, *_luma_scale(format_), table)
-        return np.repeat(grey[..., None], 3, axis=2)
-    image = _full_resolution(planes, format_, box, chroma)
-    kernels.to_rgb(image, format_.rgb_from_ycc(), table)
-    return image
+        return np.repeat(_luma(planes, format_, box, table)[..., None], 3, axis=2)
+    out = np.empty((box[3] - box[1], box[2] - box[0], 3), np.float32)
+    if out.size:
+        scratch = _scratch(box, _READING_LINES)
+        _colour.read_colour(
+            byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(BoxBounds(*box)),
+            chroma == "guided", byref(CurveTable.of(table)), scratch.ctypes.data, out.ctypes.data,
+        )  # fmt: skip
+    return out
 
 
-def _full_resolution(planes: Planes, format_: PixelFormat, box: Box, chroma: Upsampling) -> FloatImage:
-    """Y', Cb, Cr (or R', G', B') at every pixel of a region (h, w, 3), not clamped."""
-    black, scale = _luma_scale(format_)
-    if format_.matrix == "rgb":
-        red, green, blue = planes
-        return kernels.stack(red, green, blue, *box, black, scale)
-    columns, rows = _grids(planes[0].shape, format_, box)
-    guided = chroma == "guided" and format_.chroma_shift != (0, 0)
-    luma_low = np.zeros((1, 1), np.float32)
-    if guided:
-        taps = (columns.taps, columns.tap_weights, rows.taps, rows.tap_weights)
-        luma_low = kernels.chroma_means(planes[0], black, scale, *taps)
-    neutral, span = format_.chroma_code_range
-    chroma_scale = (np.float32(neutral), np.float32(1.0 / span))
-    luma, cb, cr = planes
-    return kernels.full_resolution(luma, cb, cr, black, scale, *chroma_scale, luma_low, guided, columns, rows)
+def _luma(planes: Planes, format_: PixelFormat, box: Box, table: Curve) -> FloatImage:
+    out = np.empty((box[3] - box[1], box[2] - box[0]), np.float32)
+    _colour.read_luma(
+        byref(_layout(planes, format_)), byref(PictureCodes.of(planes[:1])), byref(BoxBounds(*box)),
+        byref(CurveTable.of(table)), out.ctypes.data,
+    )  # fmt: skip
+    return out
 
 
-def _grids(shape: tuple[int, ...], format_: PixelFormat, box: Box) -> tuple[AxisGrid, AxisGrid]:
-    (sx, sy), (ox, oy) = format_.chroma_shift, format_.chroma_offset_px
-    return axis_grid(shape[1], box[0], box[2], sx, ox), axis_grid(shape[0], box[1], box[3], sy, oy)
+def _layout(planes: Planes, format_: PixelFormat) -> Layout:
+    h, w = planes[0].shape
+    return layout_of((w, h), format_)
 
 
-def _luma_scale(format_: PixelFormat) -> tuple[np.float32, np.float32]:
-    """Code of black and values per code."""
-    black, span = format_.luma_code_range
-    return np.float32(black), np.float32(1.0 / span)
-
-
-def _code_scales(format_: PixelFormat) -> list[tuple[np.float32, np.float32, np.float32]]:
-    """Code of 0, codes per unit and highest code, for luma and for chroma."""
-    top = np.float32(2**format_.bit_depth - 1)
-    ranges = (format_.luma_code_range, format_.chroma_code_range)
-    return [(np.float32(zero), np.float32(span), top) for zero, span in ranges]
+def _scratch(box: Box, lines: int) -> FloatImage:
+    """Memory that compiled code works in: lines that are a little longer than a region is wide."""
+    return np.empty(lines * (box[2] - box[0] + _LINE_MARGIN), np.float32)

@@ -37,7 +37,7 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One picture, immutable: the planes are read-only views."""
+    """One picture, immutable: the planes are read-only views, copies only where rows are not contiguous."""
 
     index: int
     """Number of the frame in its source, from 0."""
@@ -56,7 +56,8 @@ class Frame:
         found = [p.shape for p in self.planes]
         if found != shapes or any(p.dtype != expected.dtype for p in self.planes):
             raise ValueError(f"planes of {expected} must be {expected.dtype.__name__} of {shapes}, found {found}")
-        views = tuple(p.view() for p in self.planes)
+        # compiled code reads rows
+        views = tuple(p.view() if p.strides[1] == p.itemsize else np.ascontiguousarray(p) for p in self.planes)
         for view in views:
             view.flags.writeable = False
         object.__setattr__(self, "planes", views)

@@ -1,0 +1,218 @@
+/* Writes new light into a region of a picture, and pictures in another format; chroma is averaged as it was read. */
+#include "rows.h"
+
+/* Linear light within this of what a pixel had is no change: a thirtieth of an 8-bit level in the dark. */
+#define UNCHANGED 1e-5f
+/* Rows kept for chroma that averages them: more than a chroma sample's reach. */
+#define KEPT 8
+
+/* Lines that averaging works on, of each kept row. */
+enum { CHANGED, OLD_CB, OLD_CR, NEW_CB, NEW_CR, KINDS };
+
+/* Chroma rows that are averaged as soon as the last of their pixels' rows is there. */
+struct averaging {
+    const struct axis *columns, *rows;
+    int32_t x0, y0, x1, y1;             /* pixels that are there; samples that average others are left alone */
+    int32_t first, count;               /* chroma columns */
+    int32_t next;                       /* chroma row */
+    float *kept[KEPT][KINDS];           /* (x1 - x0) pixels' rows, by their number's lowest bits */
+    float *sums[KINDS];                 /* (x1 - x0) weighted sums of rows */
+    float *means[KINDS];                /* (count) */
+};
+
+/* Lines that `averaging_begin` takes from its scratch memory. */
+#define AVERAGING_LINES ((KEPT + 2) * KINDS)
+
+/* Lines of scratch memory for writing colour. */
+EXPORT const int32_t writing_lines = ROW_LINES + AVERAGING_LINES;
+
+static void averaging_begin(struct averaging *work, const struct layout *layout, struct box there, float *scratch)
+{
+    const struct axis *columns = &layout->columns, *rows = &layout->rows;
+    int32_t line = there.x1 - there.x0 + LINE_MARGIN;
+    work->columns = columns, work->rows = rows;
+    work->x0 = there.x0, work->y0 = there.y0, work->x1 = there.x1, work->y1 = there.y1;
+    for (int i = 0; i < KEPT; i++)
+        for (int k = 0; k < KINDS; k++)
+            work->kept[i][k] = scratch + line * (i * KINDS + k);
+    for (int k = 0; k < KINDS; k++) {
+        work->sums[k] = scratch + line * (KEPT * KINDS + k);
+        work->means[k] = scratch + line * ((KEPT + 1) * KINDS + k);
+    }
+    work->first = columns->lower[there.x0];
+    work->next = rows->lower[there.y0];
+    int32_t end = columns->upper[there.x1 - 1] + 1;
+    while (work->first < end && columns->tapped[work->first] < there.x0)
+        work->first++;
+    while (end > work->first && columns->tapped[(columns->taps - 1) * columns->samples + end - 1] >= there.x1)
+        end--;
+    work->count = end - work->first;
+    while (work->next < rows->samples && rows->tapped[work->next] < there.y0)
+        work->next++;
+}
+
+/* Averages the kept rows of some kinds at the chroma samples of row r. */
+static void average_rows(struct averaging *work, int32_t r, int first_kind)
+{
+    const struct axis *rows = work->rows;
+    int32_t width = work->x1 - work->x0;
+    for (int k = first_kind; k < KINDS; k++) {
+        memset(work->sums[k], 0, (size_t)width * sizeof(float));
+        for (int32_t t = 0; t < rows->taps; t++) {
+            int32_t y = rows->tapped[t * rows->samples + r];
+            add_line(work->sums[k], work->kept[y % KEPT][k], rows->tap_weights[t], width);
+        }
+        average_columns(work->columns, work->sums[k], work->x0, work->first, work->first + work->count,
+                        work->means[k]);
+    }
+}
+
+/* The next chroma row whose pixels' rows are all there up to y, -1 for none. */
+static int32_t averaging_next(struct averaging *work, int32_t y)
+{
+    const struct axis *rows = work->rows;
+    if (work->next >= rows->samples || rows->tapped[(rows->taps - 1) * rows->samples + work->next] > y)
+        return -1;
+    return work->next++;
+}
+
+/* Finds which pixels of a row change, and their new Y'CbCr. */
+static HOT void replace_line(const struct layout *layout, float *const *ycc, const float *restrict linear,
+                             int32_t count, float *restrict changed, float *restrict luma, float *restrict cb,
+                             float *restrict cr)
+{
+    struct curve decode = layout->decode, encode = layout->encode;
+    const float *rgb = layout->rgb_from_ycc, *back = layout->ycc_from_rgb;
+    const float *y = ycc[0], *u = ycc[1], *v = ycc[2];
+    for (int32_t i = 0; i < count; i++) {
+        float red = linear[3 * i], green = linear[3 * i + 1], blue = linear[3 * i + 2];
+        float r = fabsf(red - through(decode, product(rgb, 0, y[i], u[i], v[i])));
+        float g = fabsf(green - through(decode, product(rgb, 1, y[i], u[i], v[i])));
+        float b = fabsf(blue - through(decode, product(rgb, 2, y[i], u[i], v[i])));
+        float most = r > g ? r : g;
+        most = most > b ? most : b;
+        /* the root of negative light is no number, and taken for 0 */
+        red = through(encode, sqrtf(red));
+        green = through(encode, sqrtf(green));
+        blue = through(encode, sqrtf(blue));
+        float new_u = product(back, 1, red, green, blue), new_v = product(back, 2, red, green, blue);
+        /* a pixel with what is no number stays as it is: its sum is none either */
+        float share = (float)((most > UNCHANGED) & (r + g + b >= 0.0f));
+        changed[i] = share;
+        luma[i] = product(back, 0, red, green, blue);
+        cb[i] = share > 0.0f ? new_u : u[i];
+        cr[i] = share > 0.0f ? new_v : v[i];
+    }
+}
+
+/* Rounds values into a row of codes where they changed. */
+static HOT void write_changed(uint8_t *row, int32_t wide, int32_t first, const float *restrict values,
+                              const float *restrict changed, int32_t count, float zero, float span, float top)
+{
+    if (wide) {
+        uint16_t *codes = (uint16_t *)row + first;
+        for (int32_t i = 0; i < count; i++) {
+            int32_t code = nearest_code(values[i], zero, span, top), old = codes[i];
+            codes[i] = (uint16_t)(changed[i] > 0.0f ? code : old);
+        }
+    } else {
+        uint8_t *codes = row + first;
+        for (int32_t i = 0; i < count; i++) {
+            int32_t code = nearest_code(values[i], zero, span, top), old = codes[i];
+            codes[i] = (uint8_t)(changed[i] > 0.0f ? code : old);
+        }
+    }
+}
+
+/* Adds to new chroma what upsampling left unexplained of a sample, its code against the mean of its own pixels, in the
+   share of pixels that did not change. */
+static HOT void keep_unexplained(float *restrict value, const float *restrict stored, const float *restrict old,
+                                 const float *restrict share, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++)
+        value[i] += (1.0f - share[i]) * (stored[i] - old[i]);
+}
+
+/* Writes the chroma rows that are complete once row y is there. */
+static void write_chroma(struct averaging *work, const struct layout *layout, const struct picture *to, int32_t y)
+{
+    for (int32_t r; (r = averaging_next(work, y)) >= 0;) {
+        average_rows(work, r, CHANGED);
+        for (int k = 0; k < 2; k++) {
+            uint8_t *row = row_of(to, k + 1, r);
+            float *stored = work->sums[0], *value = work->means[NEW_CB + k];
+            read_codes(row, layout->wide, work->first, work->count, layout->neutral, 1.0f / layout->chroma_span,
+                       stored);
+            keep_unexplained(value, stored, work->means[OLD_CB + k], work->means[CHANGED], work->count);
+            write_changed(row, layout->wide, work->first, value, work->means[CHANGED], work->count, layout->neutral,
+                          layout->chroma_span, layout->top);
+        }
+    }
+}
+
+/* Puts new linear light (h, w, 3) into a region of `to`, a copy of `from`, where it differs from what is there.
+   `around` is the region with the pixels that share a chroma sample with it. */
+EXPORT void replace_colour(const struct layout *layout, const struct picture *from, const struct picture *to,
+                           const struct box *box, const struct box *around, const float *linear, float *scratch)
+{
+    struct rows rows;
+    struct averaging work;
+    int32_t width = around->x1 - around->x0, inside = box->x1 - box->x0, left = box->x0 - around->x0;
+    rows_begin(&rows, layout, from, *around, 1, scratch);
+    averaging_begin(&work, layout, *around, scratch + ROW_LINES * (width + LINE_MARGIN));
+    for (int32_t y = around->y0; y < around->y1; y++) {
+        float **kept = work.kept[y % KEPT], *luma = work.sums[0];
+        rows_read(&rows, y);
+        memset(kept[CHANGED], 0, (size_t)width * sizeof(float));
+        for (int k = 0; k < 2; k++) {
+            memcpy(kept[OLD_CB + k], rows.ycc[k + 1], (size_t)width * sizeof(float));
+            memcpy(kept[NEW_CB + k], rows.ycc[k + 1], (size_t)width * sizeof(float));
+        }
+        if (y >= box->y0 && y < box->y1) {
+            float *part[3] = {rows.ycc[0] + left, rows.ycc[1] + left, rows.ycc[2] + left};
+            replace_line(layout, part, linear + (ptrdiff_t)(y - box->y0) * inside * 3, inside, kept[CHANGED] + left,
+                         luma, kept[NEW_CB] + left, kept[NEW_CR] + left);
+            write_changed(row_of(to, 0, y), layout->wide, box->x0, luma, kept[CHANGED] + left, inside, layout->black,
+                          layout->luma_span, layout->top);
+        }
+        write_chroma(&work, layout, to, y);
+    }
+}
+
+/* Multiplies every pixel of a row by a matrix. */
+static HOT void recombine(const float *matrix, float *const *ycc, int32_t count, float *restrict luma,
+                          float *restrict cb, float *restrict cr)
+{
+    const float *y = ycc[0], *u = ycc[1], *v = ycc[2];
+    for (int32_t i = 0; i < count; i++) {
+        luma[i] = product(matrix, 0, y[i], u[i], v[i]);
+        cb[i] = product(matrix, 1, y[i], u[i], v[i]);
+        cr[i] = product(matrix, 2, y[i], u[i], v[i]);
+    }
+}
+
+/* A whole picture in another layout. `matrix` (3, 3) leads from one Y'CbCr to the other; `all` is 1 for every pixel of
+   a line. */
+EXPORT void convert_colour(const struct layout *layout, const struct picture *from, const struct layout *target,
+                           const struct picture *to, const struct box *whole, int32_t guided, const float *matrix,
+                           const float *all, float *scratch)
+{
+    struct rows rows;
+    struct averaging work;
+    int32_t width = whole->x1;
+    rows_begin(&rows, layout, from, *whole, guided, scratch);
+    averaging_begin(&work, target, *whole, scratch + ROW_LINES * (width + LINE_MARGIN));
+    for (int32_t y = 0; y < whole->y1; y++) {
+        float **kept = work.kept[y % KEPT], *luma = work.sums[0];
+        rows_read(&rows, y);
+        recombine(matrix, rows.ycc, width, luma, kept[NEW_CB], kept[NEW_CR]);
+        write_changed(row_of(to, 0, y), target->wide, 0, luma, all, width, target->black, target->luma_span,
+                      target->top);
+        for (int32_t r; (r = averaging_next(&work, y)) >= 0;) {
+            average_rows(&work, r, NEW_CB);
+            for (int k = 0; k < 2; k++)
+                write_changed(row_of(to, k + 1, r), target->wide, 0, work.means[NEW_CB + k], all, work.count,
+                              target->neutral, target->chroma_span, target->top);
+        }
+    }
+}
