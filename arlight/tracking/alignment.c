@@ -20,7 +20,7 @@ typedef struct {
 } Level;
 
 static const Level FINEST = {2, 8, 0.02, {0.5, OCCLUDED_BELOW}, 1};
-static const Level COARSER = {1, 5, 0.3, {-1.0, 0.2}, 2};
+static const Level COARSER = {1, 6, 0.2, {-1.0, 0.2}, 2};
 
 static int differs(double wanted, double drawn)
 {

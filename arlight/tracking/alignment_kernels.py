@@ -129,8 +129,8 @@ class AlignmentKernels:
             raise ValueError(f"luma must be uint8 or uint16 {self._size}, found {luma.dtype} {luma.shape}")
         if luma.strides[1] != luma.itemsize:
             luma = np.ascontiguousarray(luma)
-        if table.dtype != np.float32 or not table.flags.c_contiguous or (luma.itemsize == 1 and len(table) < 256):
-            raise ValueError(f"table must be float32, contiguous, with an entry for each code; found {table.dtype}")
+        if table.dtype != np.float32 or not table.flags.c_contiguous or len(table) < 256 * luma.itemsize:
+            raise ValueError(f"table must be float32, contiguous, an entry a code; found {table.dtype} {table.shape}")
         self._picture = luma, table
         shared.codes, shared.table = luma.ctypes.data, table.ctypes.data
         shared.stride, shared.code_bytes = luma.strides[0], luma.itemsize

@@ -108,6 +108,7 @@ def test_pictures_of_few_pixels(sheet, shape, coarsest) -> None:
         (np.zeros((480, 640), np.int16), TABLE),
         (np.zeros((480, 640, 3), np.uint8), TABLE),
         (np.zeros((480, 640), np.uint8), TABLE[:255]),
+        (np.zeros((480, 640), np.uint16), TABLE),
         (np.zeros((480, 640), np.uint8), TABLE.astype(float)),
         (np.zeros((480, 640), np.uint8), np.zeros(512, np.float32)[::2]),
     ],

@@ -34,8 +34,9 @@ def test_both_hypotheses_near_the_normal(sheet, camera, look, photograph) -> Non
         assert np.degrees(2 * np.arcsin(chord)) < 0.5, tilt
 
 
-def test_it_follows_fast_motion(sheet, camera, look, photograph, pose_error_px) -> None:
-    tracker, before, fastest = PoseTracker(sheet, camera), None, 0.0
+@pytest.mark.parametrize("levels", [1, 3])
+def test_it_follows_fast_motion(sheet, camera, look, photograph, pose_error_px, levels) -> None:
+    tracker, before, fastest = PoseTracker(sheet, camera, levels), None, 0.0
     for k in range(11):
         swing = np.sin(k * 0.33)
         truth = look(35 + 10 * swing, 60 + 4 * k, 420 + 20 * swing, 3 * k, (50 * swing, 30 * np.cos(k * 0.25)))
@@ -46,6 +47,25 @@ def test_it_follows_fast_motion(sheet, camera, look, photograph, pose_error_px) 
             fastest = max(fastest, pose_error_px(camera, before, truth)[0])
         before = truth
     assert fastest > 15.0
+
+
+def test_a_jump_loses_no_marker(sheet, camera, look, photograph, pose_error_px) -> None:
+    # the longer ones are too far for the finest resolution, where single markers may still fit by chance
+    tracker, pose = PoseTracker(sheet, camera), look(30, 100, 300)
+    for k in range(2):
+        tracker.update(photograph(camera, pose, seed=k, across=3), k / RATE)
+    mm_per_px = 300 / camera.camera_matrix[0, 0]
+    for k, jump_px in enumerate([(1, 0), (0, 4), (-4, 0), (4, -6)]):
+        truth = Pose(pose.rotation, pose.translation + mm_per_px * np.array([*jump_px, 0.0]))
+        found = tracker.update(photograph(camera, truth, seed=k, across=3), (2 + k) / RATE)
+        assert found.markers_used == 8
+        assert pose_error_px(camera, found.camera_from_probe, truth)[0] < 0.06
+
+
+@pytest.mark.parametrize("levels", [0, 5])
+def test_a_number_of_levels_that_there_is_not_is_refused(sheet, camera, levels) -> None:
+    with pytest.raises(ValueError, match="alignment_levels must be 1 to 4"):
+        PoseTracker(sheet, camera, levels)
 
 
 def test_sharp_shadows_do_not_lose_it(sheet, camera, look, photograph, pose_error_px) -> None:
@@ -160,6 +180,15 @@ def test_codes_of_any_range_give_the_same_pose(sheet, camera, look, photograph, 
     full = PoseTracker(sheet, camera).update(picture, 0.0)
     other = PoseTracker(sheet, camera).update(limited, 0.0, table)
     assert pose_error_px(camera, full.camera_from_probe, other.camera_from_probe)[0] < 0.01
+
+
+def test_codes_of_ten_bits(sheet, camera, look, photograph, pose_error_px) -> None:
+    picture = photograph(camera, look(40, 10, 320))
+    table = linear_from_encoded((np.arange(1024) - 64) / 876)
+    deep = np.round(64 + picture * (876 / 255)).astype(np.uint16)
+    full = PoseTracker(sheet, camera).update(picture, 0.0)
+    other = PoseTracker(sheet, camera).update(deep, 0.0, table)
+    assert pose_error_px(camera, full.camera_from_probe, other.camera_from_probe)[0] < 0.005
 
 
 def test_reset_and_strided_frames(sheet, camera, look, photograph) -> None:
