@@ -22,7 +22,7 @@ typedef struct {
     float *at;                                /* (m, 2, p) u and v of the points [modules] */
     float *slope;                             /* (m, 2, p) dT/du and dT/dv there */
     float *features;                          /* (m, FEATURES, p) */
-    float *scratch;                           /* the larger of (2, p) and 2 k + 7 (n + 1) k + k k */
+    float *scratch;                           /* the larger of (3, p) and 2 k + 7 (n + 1) k + k k */
     float *shrunk;                            /* (height / 2, width / 2) linear light at a coarser level */
     double *coefficients;                     /* (m, LIGHTING) each marker's lighting */
     double *gram;                             /* (m, FEATURES, FEATURES) weighted products, the lighting eliminated */

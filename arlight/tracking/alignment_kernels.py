@@ -18,6 +18,8 @@ Codes = NDArray[np.uint8] | NDArray[np.uint16]
 LIGHTING, FEATURES = 4, 12
 """Features of a point: a marker's lighting, pose derivatives (rotation, translation), blur, and light in the last."""
 LIGHT = FEATURES - 1
+_FARTHEST_BYTES = 2**31
+"""Places in a plane are counted in 32 bits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +101,7 @@ class AlignmentKernels:
                 "at": self.at,
                 "slope": self.slope,
                 "features": self.features,
-                "scratch": np.empty(max(2 * p, grid), np.float32),
+                "scratch": np.empty(max(3 * p, grid), np.float32),
                 "shrunk": np.empty((height // 2 + 1, width // 2 + 1), np.float32),
                 "coefficients": self.coefficients,
                 "gram": self.gram,
@@ -127,7 +129,8 @@ class AlignmentKernels:
         luma: NDArray[np.generic] = picture.luma
         if luma.shape != self._size or luma.dtype not in (np.uint8, np.uint16):
             raise ValueError(f"luma must be uint8 or uint16 {self._size}, found {luma.dtype} {luma.shape}")
-        if luma.strides[1] != luma.itemsize:
+        across, along = luma.strides
+        if along != luma.itemsize or not 0 < across * luma.shape[0] < _FARTHEST_BYTES:
             luma = np.ascontiguousarray(luma)
         if table.dtype != np.float32 or not table.flags.c_contiguous or len(table) < 256 * luma.itemsize:
             raise ValueError(f"table must be float32, contiguous, an entry a code; found {table.dtype} {table.shape}")

@@ -43,7 +43,7 @@ static double observe(const Alignment *a, int m, int n, const Plane *plane, cons
     Placed marker = placed_at(a->pose, a->places + 6 * m, a->size);
     derive(lens, &marker, points, n, a->at + 2 * m * points, a->slope + 2 * m * points, f + LIGHTING * points,
            f + LIGHT * points, spare);
-    sample(plane, n, f + LIGHT * points, spare);
+    sample(plane, n, f + LIGHT * points, spare, (int32_t *)(spare + points));
     double inside, *lighting = a->coefficients + m * LIGHTING, *gram = a->gram + m * FEATURES * FEATURES;
     a->correlation[m] = weigh(f, points, n, lighting, weights, &inside);
     weighted_gram(f, points, n, weights, spare, gram);

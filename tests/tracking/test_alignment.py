@@ -101,13 +101,13 @@ def test_only_what_is_around_the_markers_matters(sheet, camera, look, photograph
     np.testing.assert_array_equal(a.pose.translation, b.pose.translation)
 
 
-def test_a_plane_with_padded_rows_is_read_as_it_is(sheet, camera, look, photograph) -> None:
+def test_a_plane_is_read_however_it_lies_in_memory(sheet, camera, look, photograph) -> None:
     truth = look(30, 10, 420)
     luma = photograph(camera, truth)
     padded = np.pad(luma, ((0, 0), (0, 24)), constant_values=255)[:, : luma.shape[1]]
-    columns = np.repeat(luma, 2, axis=1)[:, ::2]
+    columns, upward = np.repeat(luma, 2, axis=1)[:, ::2], np.ascontiguousarray(luma[::-1])[::-1]
     alignment = FiducialAlignment(sheet, camera)
-    found = [alignment.align(whole(picture), truth, BLUR_PX, 4) for picture in (luma, padded, columns)]
+    found = [alignment.align(whole(picture), truth, BLUR_PX, 4) for picture in (luma, padded, columns, upward)]
     for other in found[1:]:
         np.testing.assert_array_equal(other.pose.rotation, found[0].pose.rotation)
         np.testing.assert_array_equal(other.pose.translation, found[0].pose.translation)
