@@ -1,297 +1,235 @@
-"""Compiled loops over the pixels of the blocks; `blocks` says what they are for."""
+"""The compiled measuring of blocks (blocks.c) and the memory that it shares with Python."""
+
+import ctypes
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-ROWS = 7
-"""What is kept of a block's fit: the mean, and cosine and sine of three harmonics."""
-MAX_COLUMNS = 16
-"""Columns of a block's fit at most: ten monomials of x and y up to degree 3, and the harmonics."""
+from arlight.camera import Camera, Pose
+from arlight.native import Workspace, library
+from arlight.tracking.block_layout import BlockLayout
+from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
+from arlight.tracking.decoding import Decoding
+from arlight.tracking.lens import camera_parameters
+from arlight.video.frame import Frame
+from arlight.video.pixel_format import PixelFormat
 
+Array = NDArray[np.float64]
 
-@njit(cache=True)
-def gather(boxes, centers, half_mm, reach_mm, margin_mm, cycles_per_mm, phase_rad, rays, plane_from_ray, camera_mm,
-           glass_mm, index_squared, stride, pixels, positions, phases, first, views):  # fmt: skip
-    """List the pixels whose film point and paper point both lie inside their block.
-
-    The paper point must keep `reach_mm` from the block's border, so that all light that reaches it came through the
-    block's own film; the film point must keep `margin_mm`, so that no neighbour is blurred into it.
-
-    Fills pixels (n,) with flat indices, positions (n, 2) in [-1, 1], phases (n,) of the film's pattern, first (b + 1,)
-    with the start of each block, views (b, 3) with sums of cos b, sin b and the view's cosine.
-    """
-    h, w = rays.shape[:2]
-    count = 0
-    capacity = pixels.shape[0]
-    g = plane_from_ray
-    for block in range(centers.shape[0]):
-        first[block] = count
-        cx, cy = centers[block]
-        paper_limit = half_mm[block] - reach_mm
-        fx, fy = cycles_per_mm[block]
-        sum_cos = 0.0
-        sum_sin = 0.0
-        sum_view = 0.0
-        step = stride[block]
-        for top in range(max(boxes[block, 1], 0), min(boxes[block, 3] + 1, h), step):
-            for left in range(max(boxes[block, 0], 0), min(boxes[block, 2] + 1, w), step):
-                # any pixel of the cell: evenly spaced ones would alias the stripes
-                chance = ((top * 73856093) ^ (left * 19349663)) >> 7
-                row, column = top + chance % step, left + (chance // step) % step
-                if row >= h or column >= w:
-                    continue
-                rx, ry = rays[row, column]
-                depth = g[2, 0] * rx + g[2, 1] * ry + g[2, 2]
-                qx = (g[0, 0] * rx + g[0, 1] * ry + g[0, 2]) / depth
-                qy = (g[1, 0] * rx + g[1, 1] * ry + g[1, 2]) / depth
-                if (
-                    abs(qx - cx) > half_mm[block] - margin_mm[block, 0]
-                    or abs(qy - cy) > half_mm[block] - margin_mm[block, 1]
-                ):
-                    continue
-                vx, vy = camera_mm[0] - qx, camera_mm[1] - qy
-                across = vx * vx + vy * vy
-                total = across + camera_mm[2] * camera_mm[2]
-                scale = glass_mm / np.sqrt(index_squared * total - across)
-                px, py = qx - scale * vx, qy - scale * vy
-                if abs(px - cx) > paper_limit or abs(py - cy) > paper_limit or count == capacity:
-                    continue
-                pixels[count] = row * w + column
-                positions[count, 0] = (px - cx) / paper_limit
-                positions[count, 1] = (py - cy) / paper_limit
-                phases[count] = 2.0 * np.pi * (fx * qx + fy * qy) + phase_rad[block]
-                view_phase = 2.0 * np.pi * scale * (fx * vx + fy * vy)
-                sum_cos += np.cos(view_phase)
-                sum_sin += np.sin(view_phase)
-                sum_view += camera_mm[2] / np.sqrt(total)
-                count += 1
-        views[block, 0] = sum_cos
-        views[block, 1] = sum_sin
-        views[block, 2] = sum_view
-    first[centers.shape[0]] = count
+_LANES, _STEP = 16, 8
+_EDGES, _SURFACES, _CUBIC, _COLOUR = 8, 3, 4, 3 * (ROWS + 3)
+_LISTS = 12 + 16
+_SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
+_PATTERNED, _WHITE, _WANTED = 1, 2, 4
+_RESULTS = (("values", ROWS * 3), ("covariance", ROWS * ROWS), ("variance", 3), ("shading", 3), ("cycles", 2),
+            ("phasor", 2), ("cosine", 1), ("trust", 1))  # fmt: skip
+_MOST_ROUNDS = 40
+_STRAIGHT = 1e-6
+"""How far a ray may still move when the lens's distortion counts as undone."""
 
 
-@njit(cache=True)
-def fit(
-    values, used, first, positions, phases, harmonics, degree, coefficients, covariance, variance, shading, samples
-):
-    """Least squares of each block's pixels on its harmonics and a polynomial of x and y.
+class _Shared(Workspace):
+    """`Blocks` of blocks.h."""
 
-    Args:
-        values: (n, r) one row a pixel; used: (n,) False for pixels to leave out.
-        harmonics: (b,) how many harmonics to fit.
-        degree: (b,) of the polynomial, 1 to 3, or 0 to leave the block alone.
-
-    Fills coefficients (b, 7, r) and their covariance (b, 7, 7) for unit variance, variance (b, r) of a pixel about the
-    fit, shading (b, r), the slope from the block's middle to its border, samples (b,); blocks with too few pixels get
-    0 samples. The polynomial's constant is the mean over the middle of the block's symmetric window, which is what the
-    block's mean is without stripes.
-    """
-    rights = values.shape[1]
-    normal = np.empty((MAX_COLUMNS, MAX_COLUMNS))
-    inverse = np.empty((MAX_COLUMNS, MAX_COLUMNS))
-    right = np.empty((MAX_COLUMNS, rights))
-    squares = np.empty(rights)
-    row = np.empty(MAX_COLUMNS)
-    solved = np.empty(MAX_COLUMNS)
-    for block in range(first.shape[0] - 1):
-        if degree[block] == 0:
-            continue
-        kept = 1 + 2 * harmonics[block]
-        columns = kept + (degree[block] + 1) * (degree[block] + 2) // 2 - 1
-        normal[:] = 0.0
-        right[:] = 0.0
-        squares[:] = 0.0
-        count = 0
-        for i in range(first[block], first[block + 1]):
-            if not used[i]:
-                continue
-            _fill_row(row, positions[i, 0], positions[i, 1], phases[i], harmonics[block], degree[block])
-            for a in range(columns):
-                for b in range(a + 1):
-                    normal[a, b] += row[a] * row[b]
-                for c in range(rights):
-                    right[a, c] += row[a] * values[i, c]
-            for c in range(rights):
-                squares[c] += values[i, c] * values[i, c]
-            count += 1
-        coefficients[block] = 0.0
-        covariance[block] = 0.0
-        variance[block] = 0.0
-        samples[block] = 0
-        if count < 2 * columns or not _invert(normal, columns, inverse):
-            continue
-        samples[block] = count
-        covariance[block, :kept, :kept] = inverse[:kept, :kept]
-        for c in range(rights):
-            explained = 0.0
-            for a in range(columns):
-                solved[a] = 0.0
-                for b in range(columns):
-                    solved[a] += inverse[a, b] * right[b, c]
-                explained += solved[a] * right[a, c]
-            coefficients[block, :kept, c] = solved[:kept]
-            variance[block, c] = max(squares[c] - explained, 0.0) / (count - columns)
-            shading[block, c] = np.hypot(solved[kept], solved[kept + 1])
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("blocks", "width", "height")),
+        *((name, ctypes.c_void_p) for name in ("lens", "upright")),
+        ("rounds", ctypes.c_int64),
+        ("vignetting", ctypes.c_double * 3),
+        ("half_diagonal_px", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("sheet", "flags")),
+        *((name, ctypes.c_double) for name in ("reach_mm", "glass_mm", "index")),
+        ("pose", ctypes.c_void_p),
+        ("edge_px", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("seen", "harmonics", "frequency", "margin", "gain", "box", "edges")),
+        *((name, ctypes.c_void_p) for name in ("surfaces", "look")),
+        *((name, ctypes.c_int64) for name in ("limit", "room")),
+        *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "places", "lists", "hue", "colour")),
+        *((name, ctypes.c_void_p) for name in ("mean_code", "ceiling", "sums", "gathered")),
+        ("planes", ctypes.c_void_p * 3),
+        ("stride", ctypes.c_int64 * 3),
+        *((name, ctypes.c_int64) for name in ("bytes", "shift_x", "shift_y")),
+        ("offset", ctypes.c_double * 3),
+        ("scale", ctypes.c_double * 3),
+        ("rgb_from_ycc", ctypes.c_double * 9),
+        ("ycc_from_rgb", ctypes.c_double * 9),
+        ("displacement_px", ctypes.c_double * 2),
+        *((name, ctypes.c_void_p) for name in ("light", "encoding")),
+        ("entries", ctypes.c_int64),
+        ("clip", ctypes.c_double),
+        ("stripes", ctypes.c_void_p),
+        *((name, ctypes.c_void_p) for name, _ in _RESULTS),
+        *((name, ctypes.c_void_p) for name in ("resolved", "samples", "valid")),
+    )
 
 
-@njit(cache=True)
-def _fill_row(row, x, y, phase, harmonics, degree):
-    """1, the harmonics, then monomials of rising degree; even ones less their mean over the square."""
-    row[0] = 1.0
-    at = 1
-    if harmonics > 0:
-        c1, s1 = np.cos(phase), np.sin(phase)
-        c, s = c1, s1
-        for _ in range(harmonics):
-            row[at] = c
-            row[at + 1] = s
-            c, s = c * c1 - s * s1, s * c1 + c * s1
-            at += 2
-    row[at] = x
-    row[at + 1] = y
-    if degree > 1:
-        row[at + 2] = x * x - 1.0 / 3.0
-        row[at + 3] = x * y
-        row[at + 4] = y * y - 1.0 / 3.0
-    if degree > 2:
-        row[at + 5] = x * x * x
-        row[at + 6] = x * x * y
-        row[at + 7] = x * y * y
-        row[at + 8] = y * y * y
+class BlockKernels:
+    """Compiled measuring of one sheet's blocks with one camera, and its memory."""
 
+    def __init__(self, layout: BlockLayout, camera: Camera, samples: int) -> None:
+        self._count = count = len(layout.half_mm)
+        self._layout = layout
+        n = -(-count // _LANES) * _LANES
+        width, height = camera.image_size
+        room = (min(samples, width * height) + 3 * _STEP) // _STEP * _STEP
+        self.flags = np.zeros(n, np.uint8)
+        self.pose = np.zeros(12)
+        self.stripes = np.zeros((n, ROWS, 3))
+        self.hue = np.zeros((2, ROWS + 1, n), np.float32)
+        self.mean_code = np.zeros((n, 3))
+        self.gathered = np.zeros(n, np.int32)
+        self.harmonics = np.zeros(n, np.int32)
+        parameters = camera_parameters(camera)
+        self._shared = _Shared(n, width, height)
+        self._shared.hold(
+            {
+                "lens": parameters,
+                "upright": np.linalg.inv(parameters[16:].reshape(3, 3)).ravel(),
+                "sheet": _sheet(layout, n),
+                "flags": self.flags,
+                "pose": self.pose,
+                "seen": np.zeros(n, np.uint8),
+                "harmonics": self.harmonics,
+                "frequency": np.zeros((2, n), np.float32),
+                "margin": np.zeros((2, n), np.float32),
+                "gain": np.ones(n, np.float32),
+                "box": np.zeros((4, n), np.float32),
+                "edges": np.zeros((_EDGES, 3, n), np.float32),
+                "surfaces": np.zeros((_SURFACES, _CUBIC, _CUBIC, n), np.float32),
+                "look": np.zeros((2, 5, n), np.float32),
+                "order": np.zeros(n, np.int32),
+                "spans": np.zeros((2, height), np.int32),
+                "rows": np.zeros((_SURFACES * _CUBIC, height), np.float32),
+                "places": np.zeros((3, room), np.int32),
+                "lists": np.zeros((_LISTS, room), np.float32),
+                "hue": self.hue,
+                "colour": np.zeros((n, _COLOUR), np.float32),
+                "mean_code": self.mean_code,
+                "ceiling": np.zeros((n, 3), np.float32),
+                "sums": np.zeros((n, _SUMS), np.float32),
+                "gathered": self.gathered,
+            }
+        )
+        shared = self._shared
+        shared.vignetting[:] = camera.vignetting or (0.0, 0.0, 0.0)
+        shared.half_diagonal_px = 0.5 * float(np.hypot(width, height))
+        shared.reach_mm, shared.glass_mm = layout.slab.max_offset_mm, layout.slab.glass_mm
+        shared.index = layout.slab.refractive_index
+        shared.limit, shared.room = samples, room
+        shared.rounds = _rounds(camera)
+        self._at = ctypes.byref(shared)
+        self._format: PixelFormat | None = None
+        self._survey, self._measure = _functions()
 
-@njit(cache=True)
-def _invert(normal, size, inverse):
-    """Inverse of a positive definite matrix (lower half given) by Cholesky; False where it is too near singular."""
-    factor = np.zeros((size, size))
-    for i in range(size):
-        for j in range(i + 1):
-            total = normal[i, j]
-            for k in range(j):
-                total -= factor[i, k] * factor[j, k]
-            if i == j:
-                if total <= 1e-6 * normal[i, i] or total <= 0.0:
-                    return False
-                factor[i, i] = np.sqrt(total)
-            else:
-                factor[i, j] = total / factor[j, j]
-    solved = np.zeros((size, size))
-    for i in range(size):
-        solved[i, i] = 1.0 / factor[i, i]
-        for j in range(i):
-            total = 0.0
-            for k in range(j, i):
-                total -= factor[i, k] * solved[k, j]
-            solved[i, j] = total / factor[i, i]
-    for i in range(size):
-        for j in range(size):
-            total = 0.0
-            for k in range(max(i, j), size):
-                total += solved[k, i] * solved[k, j]
-            inverse[i, j] = total
-    return True
+    def place(self, pose: Pose, edge_px: float, blocks: NDArray[np.bool_] | None) -> None:
+        """Say where the sheet is and which of its blocks are wanted."""
+        self.pose[:9] = np.asarray(pose.rotation, float).ravel()
+        self.pose[9:] = pose.translation
+        self._shared.edge_px = edge_px
+        layout = self._layout
+        self.flags[: self._count] = layout.flags
+        if blocks is not None:
+            self.flags[: self._count][~np.asarray(blocks, bool)] &= ~np.uint8(_WANTED)
 
-
-@njit(cache=True)
-def read_codes(plane, shift_x, shift_y, width, pixels, count, offset, scale, column, out):
-    """out[i, column] = (code - offset) * scale of the plane's sample that pixel i shares."""
-    for i in range(count):
-        row = pixels[i] // width
-        out[i, column] = (plane[row >> shift_y, (pixels[i] - row * width) >> shift_x] - offset) * scale
-
-
-@njit(cache=True)
-def block_average(values, first, average):
-    """average (b, c): mean of values (n, c) over each block's pixels."""
-    for block in range(first.shape[0] - 1):
-        start, stop = first[block], first[block + 1]
-        for c in range(values.shape[1]):
-            total = 0.0
-            for i in range(start, stop):
-                total += values[i, c]
-            average[block, c] = total / max(stop - start, 1)
-
-
-@njit(cache=True)
-def flatten_chroma(first, flat, expected):
-    """Chroma 0 for the pixels of blocks of one colour: their own mean is all that is to be known."""
-    for block in range(first.shape[0] - 1):
-        if flat[block]:
-            expected[first[block] : first[block + 1]] = 0.0
-
-
-@njit(cache=True)
-def modelled_chroma(ycc, first, phases, stripes, ycc_from_rgb, encoding, expected):
-    """Chroma (n, 2) of each pixel from the radiance (b, 7, 3) that a model gives its block at the pixel's phase.
-
-    Where the pixel is brighter or darker than the model its chroma is taken to scale with its luma. `encoding` holds
-    encoded values over the square root of linear light.
-    """
-    last = encoding.shape[0] - 1
-    for block in range(first.shape[0] - 1):
-        for i in range(first[block], first[block + 1]):
-            c1, s1 = np.cos(phases[i]), np.sin(phases[i])
-            c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
-            c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
-            luma, blue, red = 0.0, 0.0, 0.0
-            for k in range(3):
-                v = stripes[block, :, k]
-                light = v[0] + v[1] * c1 + v[2] * s1 + v[3] * c2 + v[4] * s2 + v[5] * c3 + v[6] * s3
-                x = np.sqrt(min(max(light, 0.0), 1.0)) * last
-                j = min(int(x), last - 1)
-                e = encoding[j] + (x - j) * (encoding[j + 1] - encoding[j])
-                luma += ycc_from_rgb[0, k] * e
-                blue += ycc_from_rgb[1, k] * e
-                red += ycc_from_rgb[2, k] * e
-            scale = min(max(ycc[i, 0] / max(luma, 0.02), 0.5), 2.0)
-            expected[i, 0] = scale * blue
-            expected[i, 1] = scale * red
-
-
-@njit(cache=True)
-def correct_chroma(ycc, first, phases, expected, shift, swing):
-    """Replace the chroma in ycc (n, 3) by the expected one plus its block's correction.
-
-    The correction's mean `shift` (b, 2) grows with the pixel's luma above the block's darkest, because colour
-    differences scale with the light of the stripes; `swing` (b, 2, 2) are its cosine and sine at the stripes' phase.
-    """
-    for block in range(first.shape[0] - 1):
-        start, stop = first[block], first[block + 1]
-        total = 0.0
-        dark = 1.0
-        for i in range(start, stop):
-            dark = min(dark, max(ycc[i, 0], 0.0))
-        for i in range(start, stop):
-            total += max(ycc[i, 0], 0.0) - dark + 0.02
-        mean = total / max(stop - start, 1)
-        for i in range(start, stop):
-            weight = (max(ycc[i, 0], 0.0) - dark + 0.02) / mean
-            c, s = np.cos(phases[i]), np.sin(phases[i])
-            for k in range(2):
-                ycc[i, 1 + k] = (
-                    expected[i, k] + shift[block, k] * weight + swing[block, k, 0] * c + swing[block, k, 1] * s
-                )
-
-
-@njit(cache=True)
-def linearise(encoded, count, matrix, table, linear):
-    """Linear RGB (n, 3) of encoded triples by matrix and transfer table."""
-    last = table.shape[0] - 1
-    for i in range(count):
+    def show(self, frame: Frame, curve: Decoding) -> None:
+        """Say what to measure on."""
+        shared = self._shared
+        if frame.format != self._format:
+            self._format = frame.format
+            _describe(shared, frame.format)
+        shared.hold({"light": curve.light, "encoding": curve.codes})
+        shared.entries, shared.clip = len(curve.light), curve.clip
         for c in range(3):
-            e = matrix[c, 0] * encoded[i, 0] + matrix[c, 1] * encoded[i, 1] + matrix[c, 2] * encoded[i, 2]
-            x = min(max(e, 0.0), 1.0) * last
-            k = min(int(x), last - 1)
-            linear[i, c] = table[k] + (x - k) * (table[k + 1] - table[k])
+            plane = frame.planes[c if c < len(frame.planes) else 0]
+            if plane.strides[1] != plane.itemsize or plane.strides[0] < 0:
+                plane = np.ascontiguousarray(plane)
+            shared.__dict__["held"][f"plane {c}"] = plane
+            shared.planes[c] = plane.ctypes.data
+            shared.stride[c] = plane.strides[0]
+
+    def survey(self) -> tuple[Array, NDArray[np.int32]]:
+        """Mean luma and chroma (blocks, 3) of every block, and of how many chroma samples each is."""
+        results = self._results()
+        self._survey(self._at)
+        del results
+        return self.mean_code[: self._count], self.gathered[: self._count]
+
+    def measure(self, stripes: Array | None) -> BlockMeans:
+        """All blocks' measurements."""
+        if stripes is None:
+            self._shared.stripes = None
+        else:
+            self.stripes[: self._count] = stripes
+            self._shared.stripes = self.stripes.ctypes.data
+        results, counts, valid = self._results()
+        self._measure(self._at)
+        n = self._count
+        parts, at = {}, 0
+        total = len(self.flags)
+        for name, columns in _RESULTS:
+            parts[name] = results[at : at + columns * n]
+            at += columns * total
+        return BlockMeans(
+            values=parts["values"].reshape(n, ROWS, 3),
+            covariance=parts["covariance"].reshape(n, ROWS, ROWS),
+            pixel_variance=parts["variance"].reshape(n, 3),
+            shading=parts["shading"].reshape(n, 3),
+            harmonics=counts[0, :n],
+            samples=counts[1, :n],
+            valid=valid[:n],
+            view_phasor=parts["phasor"].view(np.complex128),
+            view_cosine=parts["cosine"],
+            cycles_per_px=parts["cycles"].reshape(n, 2),
+            color_trust=parts["trust"],
+        )
+
+    def _results(self) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
+        """Fresh memory for what is measured."""
+        n = len(self.flags)
+        results = np.empty(n * sum(columns for _, columns in _RESULTS))
+        counts, valid = np.zeros((2, n), np.int64), np.zeros(n, np.bool_)
+        at = results.ctypes.data
+        for name, columns in _RESULTS:
+            setattr(self._shared, name, at)
+            at += 8 * n * columns
+        self._shared.resolved = counts.ctypes.data
+        self._shared.samples = counts.ctypes.data + 8 * n
+        self._shared.valid = valid.ctypes.data
+        return results, counts, valid
 
 
-@njit(cache=True)
-def below(linear, first, ceiling, used):
-    """Mark the pixels all of whose channels are below their block's ceiling (b, 3)."""
-    for block in range(first.shape[0] - 1):
-        for i in range(first[block], first[block + 1]):
-            used[i] = True
-            for c in range(3):
-                if linear[i, c] > ceiling[block, c]:
-                    used[i] = False
+def _sheet(layout: BlockLayout, n: int) -> NDArray[np.float32]:
+    cycles = np.sum(layout.cycles_per_mm * layout.centers_mm, axis=1) + layout.phase_rad / (2.0 * np.pi)
+    rows = np.vstack([layout.centers_mm.T, layout.half_mm, layout.cycles_per_mm.T, cycles - np.round(cycles)])
+    padding = np.repeat(rows[:, :1], n - rows.shape[1], axis=1)
+    return np.ascontiguousarray(np.hstack([rows, padding]), np.float32)
+
+
+def _describe(shared: _Shared, format_: PixelFormat) -> None:
+    stored = format_.matrix in ("rgb", "gray")
+    black, white = format_.luma_code_range
+    neutral, swing = (black, white) if stored else format_.chroma_code_range
+    shared.offset[:] = (black, neutral, neutral)
+    shared.scale[:] = (1.0 / white, 1.0 / swing, 1.0 / swing)
+    shared.bytes = np.dtype(format_.dtype).itemsize
+    shared.shift_x, shared.shift_y = format_.chroma_shift
+    shared.rgb_from_ycc[:] = format_.rgb_from_ycc().astype(float).ravel().tolist()
+    shared.ycc_from_rgb[:] = format_.ycc_from_rgb().astype(float).ravel().tolist()
+    shared.displacement_px[:] = [
+        offset - (2.0**shift - 1.0) / 2.0
+        for offset, shift in zip(format_.chroma_offset_px, format_.chroma_shift, strict=True)
+    ]
+
+
+def _rounds(camera: Camera) -> int:
+    return 0 if not np.any(camera.distortion) else 8
+
+
+@cache
+def _functions():
+    compiled = library(__file__, "blocks")
+    for function in (compiled.survey_blocks, compiled.measure_blocks):
+        function.argtypes, function.restype = [ctypes.c_void_p], None
+    return compiled.survey_blocks, compiled.measure_blocks

@@ -1,0 +1,135 @@
+/* Linear light of a block's pixels. */
+#ifndef ARLIGHT_BLOCK_LIGHT_H
+#define ARLIGHT_BLOCK_LIGHT_H
+
+#include "block_chroma.h"
+
+/* A block's pixels: lists of cos and sin of the phase, the place x, y, and CHANNELS lists of light, `room` apart. */
+typedef struct {
+    int total;
+    float *cosine, *sine, *x, *y, *light;
+} Pixels;
+
+/* Places in the decoding table of encoded RGB that follows from luma and phase. */
+static inline void colour_pixels(int harmonics, int total, const float *restrict tint, float last,
+                                 const float *restrict luma, const float *restrict c, const float *restrict s,
+                                 int32_t *restrict places)
+{
+    int steps = (total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++) {
+        float series = tint[0], ck = c[i], sk = s[i];
+        float level = tint[ROWS] + tint[ROWS + 1] * ck + tint[ROWS + 2] * sk;
+#pragma GCC unroll 3
+        for (int k = 1; k <= harmonics; k++) {
+            series += tint[2 * k - 1] * ck + tint[2 * k] * sk;
+            float next = ck * c[i] - sk * s[i];
+            sk = sk * c[i] + ck * s[i];
+            ck = next;
+        }
+        float encoded = (luma[i] * series + level) * last + 0.5f;
+        encoded = encoded > 0.0f ? encoded : 0.0f;
+        places[i] = (int32_t)(encoded < last ? encoded : last);
+    }
+}
+
+/* The same of what three planes hold at full resolution. */
+static inline void mix_pixels(int total, const double *matrix, float last, const float *restrict first,
+                              const float *restrict second, const float *restrict third, int32_t *restrict places)
+{
+    float by_first = (float)matrix[0], by_second = (float)matrix[1], by_third = (float)matrix[2];
+    int steps = (total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++) {
+        float encoded = (by_first * first[i] + by_second * second[i] + by_third * third[i]) * last + 0.5f;
+        encoded = encoded > 0.0f ? encoded : 0.0f;
+        places[i] = (int32_t)(encoded < last ? encoded : last);
+    }
+}
+
+/* Not vectorised: processors gather from tables more slowly than they read one entry after another. */
+static __attribute__((optimize("no-tree-vectorize"), noinline)) void look_up(const float *restrict table, int total,
+                                                                            const int32_t *restrict places,
+                                                                            float *restrict out)
+{
+    for (int i = 0; i < total; i++)
+        out[i] = table[places[i]];
+}
+
+/* Means of the channels and their largest values. */
+static HOT void mean_light(const Pixels *p, int64_t room, float mean[CHANNELS], float largest[CHANNELS])
+{
+    for (int c = 0; c < CHANNELS; c++) {
+        const float *light = p->light + c * room;
+        float sum = 0.0f, most = 0.0f;
+        int steps = (p->total + STEP - 1) & -STEP;
+        for (int i = 0; i < steps; i++) {
+            sum += light[i];
+            most = light[i] > most ? light[i] : most;
+        }
+        mean[c] = p->total ? sum / (float)p->total : 0.0f;
+        largest[c] = most;
+    }
+}
+
+static HOT void light_places(const Blocks *b, int block, const Span *span, const Pixels *p)
+{
+    float last = (float)(b->entries - 1), *codes = p->light;
+    int shared = b->shift_x > 0 || b->shift_y > 0;
+    for (int plane = 0; plane < (shared ? 1 : 3); plane++)
+        list_codes(b, plane, span, codes + plane * b->room);
+    int steps = whole_steps(p->total), harmonics = hue_harmonics(b->harmonics[block]);
+    for (int i = 0; i < steps; i++)
+        turn(p->cosine[i], &p->cosine[i], &p->sine[i]);
+    for (int c = 0; c < CHANNELS; c++) {
+        const float *tint = b->colour + (int64_t)block * COLOUR + c * TINT;
+        int32_t *places = b->places + c * b->room;
+        if (!shared)
+            mix_pixels(p->total, b->rgb_from_ycc + 3 * c, last, codes, codes + b->room, codes + 2 * b->room, places);
+        else if (harmonics == 0)
+            colour_pixels(0, p->total, tint, last, codes, p->cosine, p->sine, places);
+        else if (harmonics == 2)
+            colour_pixels(2, p->total, tint, last, codes, p->cosine, p->sine, places);
+        else
+            colour_pixels(3, p->total, tint, last, codes, p->cosine, p->sine, places);
+    }
+}
+
+/* Lists the pixels of a block and their light. */
+static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
+{
+    Span span = span_of(b, block, grid);
+    if (span.total > b->limit)
+        thin_out(b, &span, (int)b->limit);
+    list_points(b, block, grid, &span);
+    Pixels p = {span.total, list_of(b, PHASE_LIST), list_of(b, LISTS), list_of(b, X_LIST), list_of(b, Y_LIST),
+                list_of(b, CODE_LIST)};
+    light_places(b, block, &span, &p);
+    for (int c = 0; c < CHANNELS; c++)
+        look_up(b->light, p.total, b->places + c * b->room, p.light + c * b->room);
+    for (int k = 0; k <= LISTS; k++)
+        clear_rest(list_of(b, k), p.total);
+    return p;
+}
+
+/* Leaves out the pixels that are brighter than the ceiling in any channel. */
+static void leave_out(Pixels *p, int64_t room, const float ceiling[CHANNELS])
+{
+    int kept = 0;
+    for (int i = 0; i < p->total; i++) {
+        int used = 1;
+        for (int c = 0; c < CHANNELS; c++)
+            used &= p->light[c * room + i] <= ceiling[c];
+        p->cosine[kept] = p->cosine[i], p->sine[kept] = p->sine[i];
+        p->x[kept] = p->x[i], p->y[kept] = p->y[i];
+        for (int c = 0; c < CHANNELS; c++)
+            p->light[c * room + kept] = p->light[c * room + i];
+        kept += used;
+    }
+    p->total = kept;
+    float *lists[4] = {p->cosine, p->sine, p->x, p->y};
+    for (int k = 0; k < 4; k++)
+        clear_rest(lists[k], kept);
+    for (int c = 0; c < CHANNELS; c++)
+        clear_rest(p->light + c * room, kept);
+}
+
+#endif
