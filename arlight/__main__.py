@@ -24,6 +24,7 @@ COMMANDS = {
     "figures": "FiguresOptions",
     "trace": "TraceOptions",
     "prove": "ProveOptions",
+    "bench": "BenchOptions",
 }
 """Module of `arlight.commands` and `arlight.commands.options`, and class of options of every subcommand."""
 

@@ -1,0 +1,167 @@
+"""The front: what each setting costs and how wrong the picture is that it makes."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.benchmark.speed.clip_errors import coefficient_errors, relative_rms, rms, true_lighting
+from arlight.benchmark.speed.contest import Contender, contend, contender
+from arlight.benchmark.speed.findings import Findings
+from arlight.benchmark.speed.front_settings import FrontSetting
+from arlight.benchmark.speed.playback import FilmedClip
+from arlight.benchmark.speed.relighters import FINEST, Relighters
+from arlight.benchmark.speed.spread import Spread, spread
+from arlight.synthetic.truth import FrameTruth
+from arlight.video.frame import Frame, Region
+
+_JUDGED_EVERY = 6
+_CHANGED = 1e-6
+"""Linear light by which a pixel differs from the recorded one at least where something was drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrontPoint:
+    """One setting, measured."""
+
+    name: str
+    """Of the setting."""
+    is_preset: bool
+    """Whether it is a preset."""
+    cost_ms: Spread
+    """CPU time a frame, from tracking to the composite [ms]."""
+    estimate_ms: float
+    """Its part for pose and light, median [ms]."""
+    relight_ms: float
+    """Its part for drawing and compositing, median [ms]."""
+    relighting_error: float
+    """Error of what is seen, relative; see `picture_error`; rms over the clips."""
+    coefficient_error: float
+    """Error of the light's coefficients of orders 1 and up, relative to |L~_0|; rms over the clips."""
+    error_by_order: tuple[float, ...]
+    """The same of each order, from 0, on the first clip."""
+    on_front: bool = False
+    """Whether no other setting is both cheaper and better."""
+
+
+def measure_front(
+    settings: Sequence[FrontSetting], clips: Sequence[FilmedClip], frames: int, relighters: Relighters
+) -> Findings:
+    """Cost and error of every setting.
+
+    Args:
+        settings: what is measured.
+        clips: one size and sheet throughout; costs are those on the first.
+        frames: how many of each clip.
+        relighters: makes the drawers.
+
+    Raises:
+        RenderingUnavailableError: there is no headless OpenGL.
+    """
+    rows = [_measure_clip(settings, clip, frames, relighters) for clip in clips]
+    points = [_point(setting, [row[number] for row in rows]) for number, setting in enumerate(settings)]
+    best = pareto(np.array([[point.cost_ms.median, point.relighting_error] for point in points]))
+    found = Findings(details={"front": []})
+    for point, on_front in zip(points, best, strict=True):
+        found.details["front"].append({**asdict(point), "on_front": bool(on_front)})
+        if point.is_preset:
+            found.errors[f"relit picture, preset {point.name}"] = point.relighting_error
+            found.errors[f"light, preset {point.name}"] = point.coefficient_error
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One setting on one clip."""
+
+    contender: Contender
+    picture_error: float
+    coefficients: float
+    by_order: tuple[float, ...]
+
+
+def _measure_clip(
+    settings: Sequence[FrontSetting], clip: FilmedClip, frames: int, relighters: Relighters
+) -> list[_Row]:
+    contenders = [
+        contender(
+            clip,
+            setting.preset.tracker,
+            relighters.of(clip.probe, clip.camera, setting.preset.relight, setting.preset.tracker.order),
+        )
+        for setting in settings
+    ]
+    judge = _PictureJudge(clip, relighters, len(settings))
+    truth = contend(clip, frames, contenders, judge)
+    rows = []
+    for each, errors in zip(contenders, judge.errors, strict=True):
+        light = coefficient_errors([estimate.lighting for estimate in each.estimates], truth, clip.probe)
+        rows.append(_Row(each, float(np.median(errors)), light.together, light.orders))
+    return rows
+
+
+def _point(setting: FrontSetting, rows: Sequence[_Row]) -> FrontPoint:
+    first = rows[0].contender
+    return FrontPoint(
+        name=setting.name,
+        is_preset=setting.is_preset,
+        cost_ms=spread(first.frame_s).scaled(1e3),
+        estimate_ms=1e3 * spread(first.estimate_s).median,
+        relight_ms=1e3 * spread(first.relight_s).median,
+        relighting_error=rms(np.array([row.picture_error for row in rows])),
+        coefficient_error=rms(np.array([row.coefficients for row in rows])),
+        error_by_order=rows[0].by_order,
+    )
+
+
+class _PictureJudge:
+    """Compares some of the frames with the pictures that true pose and light make by the finest settings."""
+
+    def __init__(self, clip: FilmedClip, relighters: Relighters, contenders: int) -> None:
+        self._clip, self._finest = clip, relighters.of(clip.probe, clip.camera, FINEST)
+        self._reference: tuple[int, Frame] | None = None
+        self.errors: list[list[float]] = [[] for _ in range(contenders)]
+        """Of each contender's frames."""
+
+    def __call__(self, number: int, each: Contender, frame: Frame, composite: Frame, truth: FrameTruth) -> None:
+        if frame.index % _JUDGED_EVERY:
+            return
+        lighting = each.estimates[-1].lighting
+        if lighting is None:
+            self.errors[number].append(float("inf"))
+            return
+        if self._reference is None or self._reference[0] != frame.index:
+            true = true_lighting(lighting, truth, self._clip.probe)
+            self._reference = frame.index, self._finest.render(frame, truth.pose, true)
+        self.errors[number].append(picture_error(frame, composite, self._reference[1]))
+
+
+def picture_error(frame: Frame, composite: Frame, reference: Frame) -> float:
+    """Error of a composite where it or the reference differs from the recorded frame: object, shadow and their edges.
+
+    Returns:
+        rms of the difference in linear light, relative to the rms of the reference there; nan where nothing is drawn.
+    """
+    region = _changed_region(frame, composite, reference)
+    if region is None:
+        return float("nan")
+    recorded, shown, true = (each.linear_rgb(region) for each in (frame, composite, reference))
+    drawn = np.any((np.abs(shown - recorded) > _CHANGED) | (np.abs(true - recorded) > _CHANGED), axis=2)
+    return relative_rms(shown[drawn], true[drawn])
+
+
+def _changed_region(frame: Frame, *others: Frame) -> Region | None:
+    """The box of the pixels whose first plane differs."""
+    differs = np.any([other.planes[0] != frame.planes[0] for other in others], axis=0)
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if len(rows) == 0:
+        return None
+    return Region(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+
+
+def pareto(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of the points (n, 2) no other one beats: as good in both and better in one."""
+    no_worse = np.all(points[None, :] <= points[:, None], axis=2)
+    better = np.any(points[None, :] < points[:, None], axis=2)
+    return ~np.any(no_worse & better, axis=1)

@@ -1,0 +1,93 @@
+"""The whole loop, as `arlight run` runs it, beside a plain transcode: the same decoding and encoding alone."""
+
+from dataclasses import asdict
+from pathlib import Path
+from time import perf_counter, process_time
+
+from arlight.benchmark.speed.findings import Findings, Ratio
+from arlight.benchmark.speed.playback import FilmedClip
+from arlight.benchmark.speed.spread import paired_ratio, spread
+from arlight.benchmark.speed.workloads import FRAME_RATE
+from arlight.chain import Chain, Stage
+from arlight.pipeline import Pipeline
+from arlight.presets import EncodingSettings, Preset
+from arlight.rendering.relight import Relighter
+from arlight.results.frame_loop import Sinks, frame_loop
+from arlight.results.log import LightingLogWriter
+from arlight.results.record import LogHeader
+from arlight.video.reader import VideoReader
+from arlight.video.repetition import repeat_clip
+from arlight.video.writer import VideoWriter
+
+TRANSCODE = "plain transcode"
+_WARM_UP_FRAMES = 24
+
+
+def measure_loop(
+    clip: FilmedClip, frames: int, repeats: int, preset: Preset, relighter: Relighter, folder: Path
+) -> Findings:
+    """Wall time of the loop over a clip that is long enough, in turns with a transcode of the same clip.
+
+    Args:
+        clip: the workload; it is repeated without being encoded anew.
+        frames: length of the clip that is run, at least.
+        repeats: how often each is run.
+        preset: settings of all stages.
+        relighter: draws the object; made with the preset's settings.
+        folder: for the clips that are written.
+    """
+    # an OpenGL context belongs to the thread that drew last
+    relighter.release()
+    short, long = folder / "short.mp4", folder / "long.mp4"
+    repeat_clip(clip.path, short, float(_WARM_UP_FRAMES / FRAME_RATE))
+    count = repeat_clip(clip.path, long, float(frames / FRAME_RATE))
+    pipeline = Pipeline(clip.probe, clip.camera, relighter, preset.tracker)
+    _run(short, clip, pipeline, preset.encoding, folder)
+    loop_s, loop_cpu_s, transcode_s = [], [], []
+    for _ in range(repeats):
+        transcode_s.append(_transcode(long, preset.encoding, folder / "transcoded.mp4"))
+        pipeline.reset()
+        cpu_s = process_time()
+        loop_s.append(_run(long, clip, pipeline, preset.encoding, folder))
+        loop_cpu_s.append(process_time() - cpu_s)
+    name, ratio = f"loop, {clip.workload.name}", paired_ratio(loop_s, transcode_s)
+    found = Findings(ratios={name: Ratio(ratio, TRANSCODE, 1e3 * spread(loop_s).median / count)})
+    found.details["loop"] = [
+        {
+            "name": clip.workload.name,
+            "frames": count,
+            "frames_per_second": count / spread(loop_s).median,
+            "transcode_frames_per_second": count / spread(transcode_s).median,
+            "wall_ms": asdict(spread(loop_s).scaled(1e3 / count)),
+            "cpu_ms": asdict(spread(loop_cpu_s).scaled(1e3 / count)),
+            "over_transcode": asdict(ratio),
+        }
+    ]
+    return found
+
+
+def _run(path: Path, clip: FilmedClip, pipeline: Pipeline, encoding: EncodingSettings, folder: Path) -> float:
+    """Wall time of a run over a clip [s]."""
+    with VideoReader(path) as reader:
+        begun = perf_counter()
+        with Sinks() as sinks:
+            sinks.video = VideoWriter(folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.preset)
+            header = LogHeader.of(clip.probe, clip.camera, path.name, "probe.json")
+            sinks.log = LightingLogWriter(folder / "light.jsonl", header)
+            with frame_loop(reader, pipeline, sinks) as records:
+                for _record in records:
+                    pass
+        return perf_counter() - begun
+
+
+def _transcode(path: Path, encoding: EncodingSettings, target: Path) -> float:
+    """Wall time of decoding and encoding a clip, each in a thread [s]."""
+    with VideoReader(path) as reader:
+        begun = perf_counter()
+        with (
+            VideoWriter(target, like=reader, crf=encoding.crf, preset=encoding.preset) as writer,
+            Chain[None](reader, [Stage("write", writer.write)]) as written,
+        ):
+            for _frame in written:
+                pass
+        return perf_counter() - begun
