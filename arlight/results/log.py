@@ -7,6 +7,7 @@ complete line.
 import json
 import math
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,7 +22,8 @@ from arlight.results.record import LogHeader, LogRecord
 
 FORMAT = "arlight-lighting"
 VERSION = 1
-_DIGITS = 7
+_NUMBER = "%.9g"
+"""Enough digits for 0.1 um at a metre and for a coefficient's seventh digit; half the file of full precision."""
 _UNITS = {
     "coefficients": "radiance * sr; radiance 1 is what the camera records as full scale, linear RGB",
     "stddev": "standard deviation of |coefficient error|, same unit",
@@ -71,7 +73,7 @@ class LightingLogWriter:
             self._file: TextIO = path.open("w", encoding="utf-8", newline="\n")
         except OSError as error:
             raise OutputError(f"{path}: cannot be written ({error.strerror}); choose another --lighting") from error
-        self._write(_header_json(header))
+        self._write(json.dumps(_header_json(header), allow_nan=False, separators=(",", ":")))
 
     def write(self, record: LogRecord) -> None:
         """Append a frame.
@@ -79,7 +81,7 @@ class LightingLogWriter:
         Raises:
             OutputError: the disk is full or the file is gone.
         """
-        self._write(_record_json(record))
+        self._write(_record_line(record))
 
     def close(self) -> None:
         """Close the file; it is complete up to the last frame written."""
@@ -91,9 +93,9 @@ class LightingLogWriter:
     def __exit__(self, *_exception: object) -> None:
         self.close()
 
-    def _write(self, content: dict[str, Any]) -> None:
+    def _write(self, line: str) -> None:
         try:
-            self._file.write(json.dumps(content, allow_nan=False, separators=(",", ":")) + "\n")
+            self._file.write(line + "\n")
             self._file.flush()
         except OSError as error:
             raise OutputError(f"{self.path}: writing failed ({error.strerror}); is the disk full?") from error
@@ -175,24 +177,26 @@ def _header_from(path: Path, lines: list[str]) -> LogHeader:
         ) from error
 
 
-def _record_json(record: LogRecord) -> dict[str, Any]:
+def _record_line(record: LogRecord) -> str:
+    """A frame as JSON; written out here, because a general encoder takes longer for the numbers than the estimate."""
     pose, coefficients = record.pose, record.coefficients
-    return {
-        "frame": record.frame,
+    fields = {
+        "frame": str(record.frame),
         "time_s": _number(record.time_s),
-        "status": record.status,
-        "rvec": None if pose is None else _numbers(pose.rvec),
-        "tvec": None if pose is None else _numbers(pose.translation),
+        "status": json.dumps(record.status),
+        "rvec": _numbers(None if pose is None else pose.rvec),
+        "tvec": _numbers(None if pose is None else pose.translation),
         "reprojection_rms_px": _number(record.reprojection_rms_px),
-        "order": record.order,
-        "coefficients_re": None if coefficients is None else _numbers(coefficients.real),
-        "coefficients_im": None if coefficients is None else _numbers(coefficients.imag),
-        "stddev": None if record.stddev is None else _numbers(record.stddev),
+        "order": "null" if record.order is None else str(record.order),
+        "coefficients_re": _numbers(None if coefficients is None else coefficients.real),
+        "coefficients_im": _numbers(None if coefficients is None else coefficients.imag),
+        "stddev": _numbers(record.stddev),
         "chi2": _number(record.chi2),
         "unexplained": _number(record.unexplained),
-        "timings_ms": {stage: _number(ms) for stage, ms in record.timings_ms.items()},
+        "timings_ms": _object({stage: _number(ms) for stage, ms in record.timings_ms.items()}),
         "wall_ms": _number(record.wall_ms),
     }
+    return _object(fields)
 
 
 def _record_from(content: dict[str, Any], count: int) -> LogRecord:
@@ -219,13 +223,27 @@ def _record_from(content: dict[str, Any], count: int) -> LogRecord:
     )
 
 
-def _number(value: float | None) -> float | None:
-    # enough digits for 0.1 um at a metre and for a coefficient's seventh digit; half the file of full precision
-    return None if value is None or not math.isfinite(value) else float(f"{value:.{_DIGITS + 2}g}")
+def _object(fields: dict[str, str]) -> str:
+    return "{" + ",".join(f"{json.dumps(name)}:{value}" for name, value in fields.items()) + "}"
 
 
-def _numbers(values: NDArray[np.float64]) -> list[Any]:
-    return [_numbers(row) if np.ndim(row) else _number(float(row)) for row in values]
+def _number(value: float) -> str:
+    return _NUMBER % value if math.isfinite(value) else "null"
+
+
+def _numbers(values: NDArray[np.float64] | None) -> str:
+    """A vector or a matrix, null where it is not known."""
+    if values is None:
+        return "null"
+    flat = tuple(values.ravel().tolist())
+    if np.isfinite(values).all():
+        return _template(values.shape, _NUMBER) % flat
+    return _template(values.shape, "%s") % tuple(_number(value) for value in flat)
+
+
+@cache
+def _template(shape: tuple[int, ...], entry: str) -> str:
+    return "[" + ",".join([_template(shape[1:], entry) if len(shape) > 1 else entry] * shape[0]) + "]"
 
 
 def _or_nan(value: float | None) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from arlight.results.record import LogRecord
 from arlight.results.sample import EvenSample
 
-_KEPT = 4096
+_KEPT = 1024
 """Values that a median is taken of are fewer than this, and exact for runs of fewer frames."""
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,3 +156,19 @@ def test_a_newer_version_is_refused(tmp_path, header):
 def test_a_log_that_cannot_be_created_is_an_output_error(tmp_path, header):
     with pytest.raises(OutputError, match="cannot be written"):
         LightingLogWriter(tmp_path / "missing" / "log.jsonl", header)
+
+
+def test_single_unknown_values_are_null_too(tmp_path, header):
+    path = tmp_path / "log.jsonl"
+    record = LogRecord.of(estimate_of(0, np.random.default_rng(2)), {"track": 0.001})
+    coefficients, stddev = record.coefficients.copy(), record.stddev.copy()
+    coefficients[1, 2], stddev[0, 0] = complex(math.nan, 1.0), math.inf
+    with LightingLogWriter(path, header) as writer:
+        writer.write(replace(record, coefficients=coefficients, stddev=stddev, wall_ms=12.5))
+    content = json.loads(path.read_text().splitlines()[1])
+    assert content["coefficients_re"][1][2] is content["stddev"][0][0] is None
+    assert content["coefficients_im"][1][2] == 1.0
+    found = read_log(path).records[0]
+    assert math.isnan(found.coefficients[1, 2].real)
+    np.testing.assert_allclose(found.coefficients[0], coefficients[0], rtol=1e-7)
+    assert found.wall_ms == 12.5
