@@ -63,6 +63,7 @@ class FollowedLight:
         self._ceiling = np.tile(prior_stddev(measured.frequencies, 1.0) ** 2, (shape[0], 1))
         self._usual = 1.0
         self._level_errors = [1.0] * shape[0]
+        self._errors = [1.0] * len(self._memories)
         self._frame.take(measured, exposure)
         self._start()
 
@@ -82,7 +83,8 @@ class FollowedLight:
             False when the estimate shows another light: that is followed from now on.
         """
         self._frame.take(measured, exposure)
-        surprises, shown, kept = zip(*(memory.judge(self._frame) for memory in self._memories), strict=True)
+        judged = [memory.judge(self._frame) for memory in self._memories]
+        surprises = [surprise for surprise, _, _ in judged]
         least = min(surprises)
         if least > _SWITCH * self._usual:
             self._start()
@@ -90,8 +92,8 @@ class FollowedLight:
         share = 1.0 - math.exp(-dt / _JUDGING_S)
         self._errors = [error + share * (now - error) for error, now in zip(self._errors, surprises, strict=True)]
         self._usual += 0.1 * (least - self._usual)
-        averaged = [memory.averaged * part for memory, part in zip(self._memories, kept, strict=True)]
-        self._common.learn(self._frame, shown, averaged, dt)
+        averaged = [memory.averaged * kept for memory, (_, _, kept) in zip(self._memories, judged, strict=True)]
+        self._common.learn(self._frame, [shown for _, shown, _ in judged], averaged, dt)
         self._free_levels(share)
         self._typical.factor(self._still)
         for memory in self._memories:

@@ -1,8 +1,8 @@
 """The covariance that the frames' errors typically have, and what follows from how they correlate.
 
 A frame's estimate errs along some combinations of coefficients more than along others, and which ones changes with the
-view. The filter follows every coefficient by itself and leaves correlations to this: an innovation is first divided by how
-the frame's errors correlate, then multiplied by how those of all the frames before do. With one gain for all
+view. The filter follows every coefficient by itself and leaves correlations to this: an innovation is first divided by
+how the frame's errors correlate, then multiplied by how those of all the frames before do. With one gain for all
 coefficients that is the Kalman filter of the whole vector, P (P + R)^-1, whose P keeps the typical correlations.
 """
 

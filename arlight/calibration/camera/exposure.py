@@ -4,27 +4,27 @@ Exposure and the light's own brightness are one product in a picture. What can b
 goes from frame to frame; a filter that is told so need not take a change of exposure for a change of light.
 """
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.camera.paper_samples import PaperSampler, decoded, read_linear
+from arlight.calibration.camera.paper_samples import PaperSampler, read_encoded
 from arlight.camera import Camera, Pose
+from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
+from arlight.tracking.decoding import decoding
 from arlight.video.frame import Frame
+from arlight.video.pixel_format import PixelFormat
 
 Array = NDArray[np.float64]
 
+_LIBRARY = library(__file__, "exposure")
+_LIBRARY.measure.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p]
 _SPACING_MM = 2.2
-_CLIP = 0.94
-"""Light from which a pixel counts as clipped where the camera's radiometry does not say."""
-_FEWEST = 40
-_FEWEST_SECTORS = 8
-_ROUNDS = 5
-_TUNING = 4.7
-"""Tukey's biweight: residuals beyond so many standard deviations have no say."""
-_SMALLEST_DEVIATION = 0.002
+_MOST_POINTS = 600
+"""Pixels that are read: parts of the frame err together, so that more of each say nothing more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,24 @@ class PaperLevel:
         return bool(np.all(np.isfinite(self.level)))
 
 
+class _Workspace(Workspace):
+    """What exposure.c calls Meter."""
+
+    _fields_ = (
+        *(
+            (name, ctypes.c_void_p)
+            for name in (
+                "x", "y", "ink", "wedge", "sector", "mean", "vignetting", "light", "place", "pixel", "encoded", "gain",
+                "values", "used_x", "used_y", "used_ink", "used_light", "used_sector", "residual", "weight",
+                "bits",
+            )
+        ),
+        ("steps", ctypes.c_int64),
+        ("clip", ctypes.c_double),
+        ("code", ctypes.c_double),
+    )  # fmt: skip
+
+
 class ExposureMeter:
     """Measures the level of the frame's white paper in frames of one camera.
 
@@ -57,10 +75,15 @@ class ExposureMeter:
 
     def __init__(self, probe: Probe, camera: Camera) -> None:
         self._camera = camera
-        self._sampler = PaperSampler(probe, camera, _SPACING_MM)
-        self._scale = np.array(probe.sheet_mm) / 2.0
+        self._sampler = PaperSampler(probe, camera, _SPACING_MM, _MOST_POINTS)
+        scale = np.array(probe.sheet_mm) / 2.0
         # the level is the mean over all of the paper, so that it does not depend on which of it is seen
-        self._mean = _surface(self._sampler.paper_mm / self._scale).mean(axis=0)
+        mean = _surface(self._sampler.paper_mm / scale).mean(axis=0)
+        self._paper_share = len(self._sampler.paper_mm) / len(self._sampler.points_mm)
+        self._format: PixelFormat | None = None
+        self._encoded, self._results = np.zeros(3 * _MOST_POINTS, np.float32), np.zeros((3, 3))
+        self._results_at = address(self._results, np.float64)
+        self._workspace = _shared(self._sampler, self._sampler.points_mm / scale, mean, camera, self._encoded)
 
     def measure(self, frame: Frame, pose: Pose) -> PaperLevel:
         """Level of the white paper, with its variance.
@@ -75,58 +98,52 @@ class ExposureMeter:
             frame: the picture; its size is the camera's.
             pose: camera_from_probe.
         """
-        samples = self._sampler.sample(frame, pose)
-        light = read_linear(frame, self._camera, samples)
-        clip = _CLIP if self._camera.radiometry is None else self._camera.radiometry.clip
-        limit = clip * np.minimum(self._camera.gain(samples.pixels), 1.0) ** -1
-        surface = _surface(samples.points_mm / self._scale)
-        paper = samples.patch < 0
-        level, variance, shares = np.full(3, np.nan), np.full(3, np.inf), np.zeros(3)
-        for c in range(3):
-            clipped = light[:, c] >= limit
-            crowded = np.count_nonzero(paper & clipped) > 0.5 * np.count_nonzero(paper)
-            used = ~clipped & (paper | (crowded & (samples.reflectance > 0.0)))
-            sectors = samples.sector[used]
-            if np.count_nonzero(used) < _FEWEST or len(np.unique(sectors)) < _FEWEST_SECTORS:
-                continue
-            ink = samples.reflectance[used]
-            level[c], variance[c], kept = _robust_mean(
-                surface[used] * ink[:, None], light[used, c], sectors, self._mean
-            )
-            variance[c] += _quantisation(level[c], frame, self._camera)
-            shares[c] = kept * np.count_nonzero(used) / len(self._sampler.paper_mm)
-        return PaperLevel(level, variance, float(min(shares.min(), 1.0)))
+        if frame.format is not self._format:
+            self._decode(frame.format)
+        found, looked = self._sampler.locate(frame.size, pose)
+        read_encoded(frame, self._sampler.pixel[:found], self._encoded)
+        _LIBRARY.measure(ctypes.byref(self._workspace), found, self._results_at)
+        level, variance, counted = self._results.copy()
+        return PaperLevel(level, variance, min(float(counted.min()) / (looked * self._paper_share), 1.0))
+
+    def _decode(self, format_: PixelFormat) -> None:
+        """Take over what the codes of a format stand for."""
+        curve = decoding(format_.transfer, self._camera.radiometry)
+        self._workspace.hold({"light": np.ascontiguousarray(curve.light, np.float32)})
+        self._workspace.steps, self._workspace.clip = len(curve.light) - 1, curve.clip
+        self._workspace.code = 1.0 / format_.luma_code_range[1]
+        self._format = format_
 
 
-def _quantisation(level: float, frame: Frame, camera: Camera) -> float:
-    """Variance of a level that all pixels show by the same code, as a codec leaves them: noise does not dither it."""
-    step = 1.0 / frame.format.luma_code_range[1]
-    encoded = np.linspace(0.0, 1.0, 257)
-    light = decoded(encoded, frame, camera)
-    slope = np.interp(level, light, np.gradient(light, encoded))
-    return float((slope * step) ** 2 / 12.0)
+def _shared(
+    sampler: PaperSampler, places: Array, mean: Array, camera: Camera, encoded: NDArray[np.float32]
+) -> _Workspace:
+    x, y = places.T
+    half_diagonal_px = 0.5 * np.hypot(*camera.image_size)
+    vignetting = [*camera.camera_matrix[:2, 2], half_diagonal_px**-2, *(camera.vignetting or (0.0, 0.0, 0.0))]
+    scratch = ("gain", "values", "used_x", "used_y", "used_ink", "used_light", "residual", "weight")
+    shared = _Workspace()
+    shared.hold(
+        {
+            "x": np.ascontiguousarray(x),
+            "y": np.ascontiguousarray(y),
+            "ink": np.ascontiguousarray(sampler.reflectance, float),
+            "wedge": (sampler.patch >= 0).astype(np.int32),
+            "sector": sampler.sector.astype(np.int32),
+            "mean": mean,
+            "vignetting": np.array(vignetting),
+            "place": sampler.place,
+            "pixel": sampler.pixel,
+            "encoded": encoded,
+            **{name: np.zeros(len(sampler.place)) for name in scratch},
+            "used_sector": np.zeros(len(sampler.place), np.int32),
+            "bits": np.zeros(len(sampler.place), np.int32),
+        }
+    )
+    return shared
 
 
 def _surface(position: Array) -> Array:
     """(n, 6) terms of a quadratic surface at positions (n, 2) within [-1, 1]."""
     x, y = position.T
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-
-
-def _robust_mean(terms: Array, values: Array, sectors: NDArray[np.int64], mean: Array) -> tuple[float, float, float]:
-    """Mean of a surface through values, its variance (by sectors), and the share of values that had a say."""
-    weights = np.ones(len(values))
-    for _ in range(_ROUNDS):
-        normal = terms.T @ (weights[:, None] * terms) + 1e-9 * len(values) * np.eye(terms.shape[1])
-        coefficients = np.linalg.solve(normal, terms.T @ (weights * values))
-        residual = values - terms @ coefficients
-        deviation = 1.4826 * float(np.median(np.abs(residual)))
-        bound = _TUNING * max(deviation, _SMALLEST_DEVIATION * float(np.median(values)), 1e-6)
-        weights = np.maximum(1.0 - (residual / bound) ** 2, 0.0) ** 2
-    gain = np.linalg.solve(normal, mean)
-    # a part's pixels err together: texture, codec, light that is not quite as smooth as the surface
-    score = (terms @ gain) * weights * residual
-    parts = np.bincount(sectors, weights=score)
-    counted = len(np.unique(sectors))
-    variance = float(np.sum(parts**2)) * counted / max(counted - terms.shape[1], 1)
-    return float(mean @ coefficients), variance, float(np.mean(weights > 0.0))

@@ -4,24 +4,36 @@ The frame lies on top of everything: no glass, no film, no stripes. What its pap
 sheet, whatever the view.
 """
 
+import ctypes
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
 from arlight.errors import ProbeError
+from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
 from arlight.probe.frame_layout import window_mm
-from arlight.video.conversion import decoding_table
+from arlight.tracking.lens import camera_parameters
 from arlight.video.frame import Frame
+from arlight.video.layout import POINTERS, Layout, PictureCodes, layout_of
 
 Array = NDArray[np.float64]
+
+_LIBRARY = library(__file__, "paper_samples")
+_LIBRARY.locate.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
+_LIBRARY.read_pixels.argtypes = [POINTERS[Layout], POINTERS[PictureCodes], ctypes.c_int, *([ctypes.c_void_p] * 2)]
 
 _EDGE_PX = 3.0
 """Distance to keep from ink and edges for the blur, the pixel's square and chroma stored at half resolution [px]."""
 _LEAST_EDGE_MM = 0.8
 _LEAST_PIXELS = 40
+_CHUNK = 64
+"""Points that are looked at together (paper_samples.c)."""
+SECTORS = 24
+"""Parts of the frame, by the angle at the sheet's centre."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +42,9 @@ class PaperSamples:
 
     points_mm: Array
     """(n, 2) where on the sheet [mm]."""
-    pixels: NDArray[np.int64]
+    pixels: NDArray[np.int32]
     """(n, 2) column and row [px]."""
-    encoded: Array
+    encoded: NDArray[np.float32]
     """(n, 3) encoded R'G'B', 1 is full scale."""
     reflectance: Array
     """(n,) relative to white paper: 1 on paper, a step's own on the wedge."""
@@ -42,20 +54,29 @@ class PaperSamples:
     """(n,) number of the part of the frame; pixels of one part share their errors."""
 
 
+class _Workspace(Workspace):
+    """What paper_samples.c calls PaperPoints."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("count", "width", "height")),
+        *((name, ctypes.c_void_p) for name in ("x", "y", "clearance", "lens", "pose", "place", "pixel")),
+    )
+
+
 class PaperSampler:
-    """Reads the paper of a sheet's frame in pictures of one camera.
+    """Finds the paper of a sheet's frame in pictures of one camera.
 
     Args:
         probe: the sheet.
         camera: intrinsics of the camera.
         spacing_mm: distance of the points that are read [mm].
+        most: number of points that suffice; those of a picture are then spread evenly among all that it shows.
 
     Raises:
         ProbeError: the sheet's frame has no unprinted paper to speak of.
     """
 
-    def __init__(self, probe: Probe, camera: Camera, spacing_mm: float = 0.9) -> None:
-        self._camera = camera
+    def __init__(self, probe: Probe, camera: Camera, spacing_mm: float = 0.9, most: int | None = None) -> None:
         wedge = [block for block in probe.blocks if block.kind == "wedge"]
         squares = [np.array(marker.corners_mm) for marker in probe.markers]
         squares += [_square(block.center_mm, block.size_mm) for block in wedge]
@@ -68,18 +89,62 @@ class PaperSampler:
             points.append(grid)
             clearance.append(_inside_mm(grid, _square(block.center_mm, block.size_mm)))
             patch.append(np.full(len(grid), number))
-        self._points = np.concatenate(points)
-        self._clearance = np.concatenate(clearance)
-        self._patch = np.concatenate(patch)
+        order = np.arange(sum(map(len, points)))
+        if most is not None:
+            # the first that a picture shows are then a fair sample of all
+            np.random.default_rng(0).shuffle(order)
+        self.points_mm = np.concatenate(points)[order]
+        """(n, 2) points of paper and wedge [mm]."""
+        self.patch = np.concatenate(patch)[order]
+        """(n,) number of the wedge step that they lie on; -1 on paper."""
         steps = np.array([block.reflectance or 0.0 for block in wedge] + [1.0])
-        self._reflectance = steps[self._patch]
-        angle = np.arctan2(self._points[:, 1], self._points[:, 0])
-        self._sector = np.floor((angle / (2.0 * np.pi) + 0.5) * 24.0).astype(np.int64) % 24
+        self.reflectance = steps[self.patch]
+        """(n,) relative to white paper."""
+        angle = np.arctan2(self.points_mm[:, 1], self.points_mm[:, 0])
+        self.sector = np.floor((angle / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
+        """(n,) the part of the frame that they lie in."""
+        self._most = len(order) if most is None else most
+        self._share(np.concatenate(clearance)[order], camera)
+
+    def _share(self, clearance: Array, camera: Camera) -> None:
+        """Lay out what the compiled part reads and writes."""
+        count = len(self.points_mm)
+        padded = np.full((3, -(-count // _CHUNK) * _CHUNK), -1.0, np.float32)
+        padded[:2, :count], padded[2, :count] = self.points_mm.T, clearance
+        self.place = np.zeros(self._most, np.int32)
+        """(most,) numbers of the points that the last picture shows, as many as `locate` told."""
+        self.pixel = np.zeros((self._most, 2), np.int32)
+        """(most, 2) their columns and rows in it [px]."""
+        self._pose, self._looked = np.zeros(12), ctypes.c_int32()
+        self._workspace = _Workspace(count)
+        x, y, clearance = padded
+        self._workspace.hold(
+            {
+                "x": x, "y": y, "clearance": clearance, "lens": camera_parameters(camera), "pose": self._pose,
+                "place": self.place, "pixel": self.pixel,
+            }
+        )  # fmt: skip
 
     @property
     def paper_mm(self) -> Array:
         """(m, 2) the points of blank paper that are sampled where they can be seen [mm]."""
-        return self._points[self._patch < 0]
+        return self.points_mm[self.patch < 0]
+
+    def locate(self, size: tuple[int, int], pose: Pose) -> tuple[int, int]:
+        """Find the points that a picture of `size` (w, h) [px] shows clear of all print, into `place` and `pixel`.
+
+        Args:
+            size: of the picture [px].
+            pose: camera_from_probe.
+
+        Returns:
+            How many there are, and how many were looked at until those were found.
+        """
+        self._workspace.width, self._workspace.height = size
+        self._pose[:9], self._pose[9:] = pose.rotation.ravel(), pose.translation
+        shared, looked = ctypes.byref(self._workspace), ctypes.byref(self._looked)
+        found = _LIBRARY.locate(shared, _EDGE_PX, self._most, looked)
+        return found, self._looked.value
 
     def sample(self, frame: Frame, pose: Pose) -> PaperSamples:
         """Paper and wedge as one picture shows them; empty where they are out of it or too small in it.
@@ -88,57 +153,32 @@ class PaperSampler:
             frame: the picture; its size is the camera's.
             pose: camera_from_probe.
         """
-        space = np.column_stack([self._points, np.zeros(len(self._points))])
-        places = self._camera.project(pose, space)
-        depth = pose.transform(space)[:, 2]
-        at = np.rint(np.where(np.isfinite(places), places, -1.0)).astype(np.int64)
-        inside = np.all((at >= 1) & (at < np.array(frame.size) - 1), axis=1)
-        margin_mm = _EDGE_PX / np.maximum(self._narrow_px_per_mm(pose, space), 1e-9)
-        kept = inside & (depth > 0.0) & (self._clearance > margin_mm)
-        at = at[kept]
+        found, _ = self.locate(frame.size, pose)
+        kept, pixels = self.place[:found], self.pixel[:found].copy()
         return PaperSamples(
-            self._points[kept], at, read_encoded(frame, at), self._reflectance[kept], self._patch[kept],
-            self._sector[kept],
+            self.points_mm[kept], pixels, read_encoded(frame, pixels), self.reflectance[kept], self.patch[kept],
+            self.sector[kept],
         )  # fmt: skip
 
-    def _narrow_px_per_mm(self, pose: Pose, space: Array) -> Array:
-        """(n,) how many pixels a millimetre of the sheet takes up the narrow way across, without lens distortion."""
-        matrix = self._camera.camera_matrix
-        seen = pose.transform(space)
-        sight, scale = seen[:, :2] / seen[:, 2:], np.diag(matrix)[:2] / seen[:, 2:]
-        right, up = (scale * (pose.rotation[:2, k] - sight * pose.rotation[2, k]) for k in range(2))
-        area = np.abs(right[:, 0] * up[:, 1] - right[:, 1] * up[:, 0])
-        narrow: Array = area / np.sqrt(np.maximum(np.sum(right**2, axis=1) + np.sum(up**2, axis=1), 1e-30))
-        return narrow
 
+def read_encoded(
+    frame: Frame, pixels: NDArray[np.integer[Any]], out: NDArray[np.float32] | None = None
+) -> NDArray[np.float32]:
+    """Encoded R'G'B' (n, 3) of single pixels (n, 2), chroma as its nearest sample has it; clamped to [0, 1].
 
-def read_encoded(frame: Frame, pixels: NDArray[np.int64]) -> Array:
-    """Encoded R'G'B' (n, 3) of single pixels (n, 2), chroma as its nearest sample has it; clamped to [0, 1]."""
-    format_ = frame.format
-    x, y = pixels.T
-    black, span = format_.luma_code_range
-    if format_.plane_count == 1:
-        return np.repeat(((frame.planes[0][y, x] - black) / span)[:, None], 3, axis=1).clip(0.0, 1.0)
-    shift_x, shift_y = (0, 0) if format_.matrix == "rgb" else format_.chroma_shift
-    zero, chroma_span = (black, span) if format_.matrix == "rgb" else format_.chroma_code_range
-    triple = np.empty((len(pixels), 3))
-    triple[:, 0] = (frame.planes[0][y, x] - black) / span
-    for k in (1, 2):
-        triple[:, k] = (frame.planes[k][y >> shift_y, x >> shift_x] - zero) / chroma_span
-    return np.clip(triple @ format_.rgb_from_ycc().T.astype(float), 0.0, 1.0)
-
-
-def read_linear(frame: Frame, camera: Camera, samples: PaperSamples) -> Array:
-    """Light (n, 3) of samples: decoded by the camera's own curve where it has one, freed of vignetting."""
-    return decoded(samples.encoded, frame, camera) / camera.gain(samples.pixels)[:, None]
-
-
-def decoded(encoded: Array, frame: Frame, camera: Camera) -> Array:
-    """Light of encoded values, any shape, by the camera's own curve where it has one, else by the footage's."""
-    if camera.radiometry is not None:
-        return camera.radiometry.linear(encoded)
-    table = decoding_table(frame.format.transfer)[:-1].astype(float)
-    return np.interp(encoded, np.linspace(0.0, 1.0, len(table)), table)
+    Args:
+        frame: the picture.
+        pixels: columns and rows inside it [px].
+        out: room for 3 n numbers, where they are written one channel after the other; new by default.
+    """
+    count, pixels = len(pixels), np.ascontiguousarray(pixels, np.int32)
+    out = np.empty(3 * count, np.float32) if out is None else out
+    planes = [plane if plane.strides[1] == plane.itemsize else plane.copy() for plane in frame.planes]
+    _LIBRARY.read_pixels(
+        layout_of(frame.size, frame.format), PictureCodes.of(planes), count, address(pixels, np.int32),
+        address(out, np.float32),
+    )  # fmt: skip
+    return out[: 3 * count].reshape(3, count).T
 
 
 def _blank_paper(probe: Probe, squares: list[Array], spacing_mm: float) -> tuple[Array, Array]:
