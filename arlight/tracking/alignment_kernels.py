@@ -68,7 +68,6 @@ class AlignmentKernels:
     def __init__(self, probe: Probe, camera: Camera) -> None:
         template = FiducialTemplate.of_probe(probe)
         m, p = template.index_u.shape
-        size, positions = template.size, len(template.position_base)
         self.places = template.places.copy()
         """(m, 6) top left corner, one module to the right, one module down, x and y each, probe frame [mm]."""
         self.at, self.slope = np.zeros((m, 2, p), np.float32), np.zeros((m, 2, p), np.float32)
@@ -82,38 +81,36 @@ class AlignmentKernels:
         """(m,) of each marker with its picture, and in the pose's equations: 0 is left out."""
         self.pose, self.result = np.zeros(12), np.zeros(3)
         """(12,) rotation row by row and translation, and (3,) residual rms, corners' standard deviation, blur [px]."""
-        corners = np.array([marker.corners_mm for marker in probe.markers], float)
-        width, height = camera.image_size
-        grid = 2 * positions + 7 * (size + 1) * positions + positions**2
         self._drawn = np.zeros((m, 4))
-        self._shared = _Shared(m, p, size, positions, radius_mm=float(np.linalg.norm(corners, axis=2).max()))
-        self._shared.hold(
-            {
-                "camera": camera_parameters(camera),
-                "outline": np.ascontiguousarray(probe.outline_mm, float),
-                "places": self.places,
-                "black": template.black.astype(np.float32),
-                "base": template.position_base.astype(np.float32),
-                "spread": template.position_spread.astype(np.float32),
-                "index_u": template.index_u.astype(np.int32),
-                "index_v": template.index_v.astype(np.int32),
-                "drawn": self._drawn,
-                "at": self.at,
-                "slope": self.slope,
-                "features": self.features,
-                "scratch": np.empty(max(3 * p, grid), np.float32),
-                "shrunk": np.empty((height // 2 + 1, width // 2 + 1), np.float32),
-                "coefficients": self.coefficients,
-                "gram": self.gram,
-                "correlation": self.correlation,
-                "weight": self.weight,
-                "pose": self.pose,
-                "result": self.result,
-            }
+        corners = np.array([marker.corners_mm for marker in probe.markers], float)
+        self._shared = _Shared(
+            m, p, template.size, len(template.position_base), radius_mm=float(np.linalg.norm(corners, axis=2).max())
         )
-        self._at = ctypes.byref(self._shared)
+        width, height = camera.image_size
         self._size = (height, width)
+        self._shared.hold({**_constants(template, probe, camera), **self._memory(template)})
+        self._at = ctypes.byref(self._shared)
         self._align, self._draw, self._observe = _functions()
+
+    def _memory(self, template: FiducialTemplate) -> dict[str, NDArray[np.generic]]:
+        """What the compiled code writes, by its name in the structure."""
+        k, n, p = len(template.position_base), template.size, template.index_u.shape[1]
+        height, width = self._size
+        return {
+            "places": self.places,
+            "drawn": self._drawn,
+            "at": self.at,
+            "slope": self.slope,
+            "features": self.features,
+            "scratch": np.empty(max(3 * p, 2 * k + 7 * (n + 1) * k + k**2), np.float32),
+            "shrunk": np.empty((height // 2 + 1, width // 2 + 1), np.float32),
+            "coefficients": self.coefficients,
+            "gram": self.gram,
+            "correlation": self.correlation,
+            "weight": self.weight,
+            "pose": self.pose,
+            "result": self.result,
+        }
 
     def reset(self) -> None:
         """Draw the templates anew: without it, one drawn for nearly the same blur is kept."""
@@ -173,6 +170,19 @@ class AlignmentKernels:
     def _place(self, pose: Pose) -> None:
         self.pose[:9] = pose.rotation.ravel()
         self.pose[9:] = pose.translation
+
+
+def _constants(template: FiducialTemplate, probe: Probe, camera: Camera) -> dict[str, NDArray[np.generic]]:
+    """What the compiled code reads, by its name in the structure."""
+    return {
+        "camera": camera_parameters(camera),
+        "outline": np.ascontiguousarray(probe.outline_mm, float),
+        "black": template.black.astype(np.float32),
+        "base": template.position_base.astype(np.float32),
+        "spread": template.position_spread.astype(np.float32),
+        "index_u": template.index_u.astype(np.int32),
+        "index_v": template.index_v.astype(np.int32),
+    }
 
 
 def _functions() -> tuple["ctypes._NamedFuncPointer", "ctypes._NamedFuncPointer", "ctypes._NamedFuncPointer"]:
