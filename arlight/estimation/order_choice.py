@@ -1,0 +1,132 @@
+"""The order of light that a scene requires: what the object shows of each order against how well the data tell it.
+
+Light is a sum of independent parts of unit variance, of which the first k make the coefficients up to an order
+(a triangular factor of natural light's covariance). What an object shows is linear in them, so leaving out the orders
+beyond K costs
+
+    error^2(K) = sum over parts up to K of shown * variance  +  sum over parts beyond K of shown * strength
+
+where `shown` is the squared change of the picture with a part, `variance` how uncertain the part is and `strength` its
+square, freed of noise. Measuring less saves work, so the lowest order is chosen that costs next to nothing.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arlight.estimation.lighting import Lighting
+from arlight.estimation.prior import prior_stddev
+from arlight.fourier import frequency_order, pack_real
+
+Array = NDArray[np.float64]
+
+_LOOK_EVERY_S = 1.0
+"""Time after which all orders are measured once more [s]."""
+_LOWER_AFTER_S = 0.4
+"""Time for which a lower order must have sufficed before it is taken [s]."""
+_STEP = 0.5
+"""Change of the chosen parts, relative to their size, that calls for another look at all orders."""
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """What of the light is wanted."""
+
+    independent: Array
+    """(m, m) lower triangle that makes real-packed coefficients of independent parts."""
+    shown: Array
+    """(m,) squared change of what is wanted with each part."""
+    tolerance: float
+    """Share by which a lower order may raise the error."""
+
+    @classmethod
+    def of_coefficients(cls, frequencies: NDArray[np.int64]) -> "Need":
+        """All coefficients for their own sake: no order is left out that the data tell anything about."""
+        spread = prior_stddev(frequencies, 1.0)
+        return cls(np.diag(spread), spread**2, 0.0)
+
+
+class OrderChoice:
+    """Chooses the order to measure and draw in every frame.
+
+    Args:
+        frequencies: (k, 2) that the sheet measures, by rising order.
+        need: what of the light is wanted.
+    """
+
+    def __init__(self, frequencies: NDArray[np.int64], need: Need) -> None:
+        order = frequency_order(frequencies)
+        self.highest = int(order.max())
+        """Order of the sheet."""
+        self._need = need
+        self._parts = np.linalg.inv(need.independent)
+        self._squared_parts = self._parts**2
+        self._of_order = np.concatenate([order[:1], np.repeat(order[1:], 2)])
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the light."""
+        self.order = self.highest
+        """Highest order that the scene requires."""
+        self._lost = np.zeros(self.highest + 1)
+        self._unsure = np.zeros(self.highest + 1)
+        self._looked_s, self._fits_since_s = -math.inf, math.inf
+        self._strength = 0.0
+
+    def order_to_measure(self, time_s: float) -> int:
+        """Highest order to measure in the frame at a time [s]: the chosen one, now and then all."""
+        return self.highest if time_s - self._looked_s >= _LOOK_EVERY_S else self.order
+
+    def learn(self, seen: Lighting, filtered: Lighting, time_s: float) -> None:
+        """Take in a frame's own lighting and the filtered one, of the order that was measured or less."""
+        measured, strength, _ = self._by_order(seen)
+        self._lost[: measured + 1] = strength
+        known, strength, variance = self._by_order(filtered)
+        self._lost[: known + 1], self._unsure[: known + 1] = strength, variance
+        if measured == self.highest:
+            self._looked_s = time_s
+        # light that changes may have changed beyond the orders that are looked at
+        now = float(np.sum(strength[1:]))
+        if measured < self.highest and abs(now - self._strength) > _STEP * max(now, self._strength):
+            self._looked_s = -math.inf
+        if measured == self.highest or self._looked_s == -math.inf:
+            self._strength = now
+        self._choose(time_s)
+
+    def _by_order(self, lighting: Lighting) -> tuple[int, Array, Array]:
+        """Order, and by order what leaving it out would lose and what its uncertainty costs."""
+        packed = pack_real(lighting.coefficients) / max(float(np.mean(lighting.coefficients[0].real)), 1e-3)
+        level = np.maximum(np.mean(lighting.coefficients[0].real), 1e-3)
+        n = len(packed)
+        parts = self._parts[:n, :n] @ packed
+        variance = self._squared_parts[:n, :n] @ np.einsum("cii->ic", lighting.covariance) / level**2
+        strength = np.mean(parts**2 - variance, axis=1) * self._need.shown[:n]
+        unsure = np.mean(variance, axis=1) * self._need.shown[:n]
+        orders = self._of_order[:n]
+        highest = int(orders[-1])
+        return (
+            highest,
+            np.maximum(np.bincount(orders, strength, highest + 1), 0.0),
+            np.bincount(orders, unsure, highest + 1),
+        )
+
+    def _choose(self, time_s: float) -> None:
+        """Rise at once, fall when a lower order has sufficed for a while."""
+        cost = np.sqrt(np.cumsum(self._unsure) + np.concatenate([np.cumsum(self._lost[:0:-1])[::-1], [0.0]]))
+        least = float(cost.min())
+        if cost[self.order] > (1.0 + self._need.tolerance) * least:
+            self.order, self._fits_since_s = self._lowest(cost, 0.5 * self._need.tolerance), math.inf
+            return
+        lower = self._lowest(cost, 0.5 * self._need.tolerance)
+        if lower >= self.order:
+            self._fits_since_s = math.inf
+        elif not math.isfinite(self._fits_since_s):
+            self._fits_since_s = time_s
+        elif time_s - self._fits_since_s >= _LOWER_AFTER_S:
+            self.order, self._fits_since_s = lower, math.inf
+
+    @staticmethod
+    def _lowest(cost: Array, tolerance: float) -> int:
+        return int(np.flatnonzero(cost <= (1.0 + tolerance) * cost.min())[0])
