@@ -26,6 +26,8 @@ _LOOK_EVERY_S = 1.0
 """Time after which all orders are measured once more [s]."""
 _LOWER_AFTER_S = 0.4
 """Time for which a lower order must have sufficed before it is taken [s]."""
+_DARKEST = 1e-3
+"""Level below which light is not divided by it [radiance * sr]."""
 _STEP = 0.5
 """Change of the chosen parts, relative to their size, that calls for another look at all orders."""
 
@@ -97,8 +99,8 @@ class OrderChoice:
 
     def _by_order(self, lighting: Lighting) -> tuple[int, Array, Array]:
         """Order, and by order what leaving it out would lose and what its uncertainty costs."""
-        packed = pack_real(lighting.coefficients) / max(float(np.mean(lighting.coefficients[0].real)), 1e-3)
-        level = np.maximum(np.mean(lighting.coefficients[0].real), 1e-3)
+        level = max(float(np.mean(lighting.coefficients[0].real)), _DARKEST)
+        packed = pack_real(lighting.coefficients) / level
         n = len(packed)
         parts = self._parts[:n, :n] @ packed
         variance = self._squared_parts[:n, :n] @ np.einsum("cii->ic", lighting.covariance) / level**2
@@ -106,11 +108,8 @@ class OrderChoice:
         unsure = np.mean(variance, axis=1) * self._need.shown[:n]
         orders = self._of_order[:n]
         highest = int(orders[-1])
-        return (
-            highest,
-            np.maximum(np.bincount(orders, strength, highest + 1), 0.0),
-            np.bincount(orders, unsure, highest + 1),
-        )
+        lost, unsure_by_order = (np.asarray(np.bincount(orders, of, highest + 1), float) for of in (strength, unsure))
+        return highest, np.maximum(lost, 0.0), unsure_by_order
 
     def _choose(self, time_s: float) -> None:
         """Rise at once, fall when a lower order has sufficed for a while."""
