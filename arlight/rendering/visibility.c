@@ -83,10 +83,9 @@ static inline void draw_map(const Scene *s, const float *basis)
     }
 }
 
-/* How free each point is, (point_count,), 0 to 255: the four texels around it, weighed bilinearly. */
-EXPORT HOT void look_along(const Scene *s, const float *basis, uint8_t *seen)
+/* How free each point is, (point_count,), 0 to 255: the map's four texels around it, weighed bilinearly. */
+static inline void look_up(const Scene *s, const float *basis, uint8_t *seen)
 {
-    draw_map(s, basis);
     float side = (float)s->side, bias = (float)s->bias;
     const float *nearest = s->nearest, *points = s->points;
     int32_t width = (int32_t)s->side;
@@ -104,5 +103,14 @@ EXPORT HOT void look_along(const Scene *s, const float *basis, uint8_t *seen)
         float c = (float)(nearest[at + width] >= z), d = (float)(nearest[at + width + 1] >= z);
         float upper = a + fx * (b - a), lower = c + fx * (d - c), free = upper + fy * (lower - upper);
         seen[i] = (uint8_t)(int32_t)(inside ? 255.0f * free + 0.5f : 255.0f);
+    }
+}
+
+/* What hides the points along each of `count` directions: bases (count, 9), seen (count, point_count). */
+EXPORT HOT void look_along(const Scene *s, const float *bases, int64_t count, uint8_t *seen)
+{
+    for (int64_t i = 0; i < count; i++) {
+        draw_map(s, bases + 9 * i);
+        look_up(s, bases + 9 * i, seen + i * s->point_count);
     }
 }

@@ -37,5 +37,17 @@ def test_a_convex_surface_does_not_hide_itself():
 def test_progress_runs_to_one():
     ball = from_trimesh(trimesh.creation.icosphere(subdivisions=1)).placed(20.0)
     shares = []
-    visibility(ball, ball.vertices_mm, hemisphere_points(4), shares.append)
-    assert shares == [0.25, 0.5, 0.75, 1.0]
+    visibility(ball, ball.vertices_mm, hemisphere_points(300), shares.append)
+    assert len(shares) > 1
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+@pytest.mark.parametrize("count", [1, 64, 150])
+def test_every_direction_is_seen_for_itself(count):
+    ball = from_trimesh(trimesh.creation.icosphere(subdivisions=2)).placed(20.0)
+    points = np.random.default_rng(5).uniform([-30, -30, 0], [30, 30, 30], (50, 3))
+    directions = np.concatenate([hemisphere_points(count), [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]])
+    together = visibility(ball, points, directions)
+    alone = [visibility(ball, points, direction[None])[0] for direction in directions]
+    assert np.array_equal(together, alone)
