@@ -24,22 +24,21 @@ _GREEN = 1
 """The channel that is told by its own rows: red and blue also lean on green through their colour lines."""
 _SETTLING = 20
 """Frames until blur and reflection have been found."""
-_PIXEL_NOISE = 0.012
-"""Standard deviation of a pixel in linear light."""
 _BLUR_VARIANCE_PX2 = 0.4
 _SEED = 11
 
 
-def measure_bound(clip: FilmedClip, frames: int) -> Findings:
+def measure_bound(clip: FilmedClip, frames: int, pixel_noise: float = 0.012) -> Findings:
     """rms error of green, orders 1 and up, of single frames, over the bound's.
 
     Args:
         clip: gives the view of the sheet and the true light.
         frames: how many are drawn, after settling.
+        pixel_noise: standard deviation of a pixel in linear light, 1 is full scale.
     """
     probe, truth = clip.probe, clip.truth[0]
     seen = BlockMeter(probe, clip.camera).measure(clip.frames[0], truth.pose, float(np.sqrt(_BLUR_VARIANCE_PX2)))
-    seen = replace(seen, pixel_variance=np.full_like(seen.pixel_variance, _PIXEL_NOISE**2))
+    seen = replace(seen, pixel_variance=np.full_like(seen.pixel_variance, pixel_noise**2))
     ideal = _ideal_rows(seen, BlockResponse(probe), truth.coefficients)
     estimator, nuisance, squares = LightingEstimator(probe), None, []
     noise = np.random.default_rng(_SEED)

@@ -25,7 +25,7 @@ _SHEET_IN_EVERY_SIZE_PX = 400.0
 
 def growth_workloads() -> tuple[Workload, ...]:
     """What must be filmed for `measure_sheets` and `measure_sizes`, beside the sheets of all orders."""
-    return (*_by_width(), *_by_size())
+    return tuple(dict.fromkeys([*_by_width(), *_by_size()]))
 
 
 def _by_width() -> tuple[Workload, ...]:

@@ -4,11 +4,13 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from arlight.benchmark.speed.findings import Findings
 from arlight.benchmark.speed.workloads import HEADLINE
 
 _PRESET, _POINT, _LINE = "#c1440e", "#7a8a99", "#2b4c6f"
+_TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 _STAGES = (
     "track",
     "measure",
@@ -62,6 +64,11 @@ def _draw_front(axes: Axes, points: list[dict[str, Any]], error: str, label: str
     axes.set_ylabel(label)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.margins(x=0.14, y=0.1)
+    for scale in (axes.xaxis, axes.yaxis):
+        scale.set_major_locator(LogLocator(subs=_TICKS))
+        scale.set_major_formatter(StrMethodFormatter("{x:g}"))
+        scale.set_minor_formatter(NullFormatter())
     _finish(axes)
 
 

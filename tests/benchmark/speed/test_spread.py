@@ -1,0 +1,42 @@
+"""Medians and paired ratios."""
+
+import numpy as np
+import pytest
+
+from arlight.benchmark.speed.spread import paired_ratio, spread
+
+
+def test_most_of_the_values_lie_between_low_and_high():
+    values = np.random.default_rng(1).lognormal(size=1000)
+    found = spread(values)
+    assert np.mean(values < found.low) == pytest.approx(0.1, abs=0.002)
+    assert np.mean(values < found.median) == pytest.approx(0.5, abs=0.002)
+    assert np.mean(values > found.high) == pytest.approx(0.1, abs=0.002)
+    assert found.count == 1000
+
+
+def test_a_single_value_is_everything():
+    assert spread([3.0]).low == spread([3.0]).median == spread([3.0]).high == 3.0
+
+
+def test_another_unit_scales_all_of_it():
+    in_s, in_ms = spread([0.001, 0.002, 0.004]), spread([1.0, 2.0, 4.0])
+    scaled = in_s.scaled(1e3)
+    assert (scaled.low, scaled.median, scaled.high) == pytest.approx((in_ms.low, in_ms.median, in_ms.high))
+
+
+def test_what_slows_both_of_a_pair_leaves_their_ratio():
+    machine = np.random.default_rng(2).uniform(1.0, 10.0, 50)
+    ratio = paired_ratio(list(0.25 * machine), list(machine))
+    assert (ratio.low, ratio.median, ratio.high) == pytest.approx((0.25, 0.25, 0.25))
+
+
+def test_an_interruption_of_a_few_pairs_does_not_move_the_median():
+    measured = np.full(20, 2.0)
+    measured[:4] = 100.0
+    assert paired_ratio(list(measured), [4.0] * 20).median == 0.5
+
+
+def test_what_was_not_measured_in_pairs_is_refused():
+    with pytest.raises(ValueError, match="shape"):
+        paired_ratio([1.0, 2.0, 3.0], [1.0, 2.0])
