@@ -59,10 +59,8 @@ class CommonError:
 
     def reset(self) -> None:
         """Forget everything."""
-        self._independent = _Average(_LEARNING_S)
-        self._shown = [_Average(_LEARNING_S) for _ in self._means]
-        self._lately = [_Average(_CHANGE_S) for _ in self._means]
-        self._averaged = [_Average(_LEARNING_S) for _ in self._means]
+        self._independent = _Average()
+        self._shown, self._lately, self._averaged = ([_Average() for _ in self._means] for _ in range(3))
         self._seen = 0
 
     def start(self, frame: RelativeLight) -> None:
@@ -84,14 +82,15 @@ class CommonError:
             averaged: of each mean, its variance over the frame's if the errors of all frames were independent.
             dt: time since the last frame [s].
         """
+        learning, change = (1.0 - math.exp(-dt / memory_s) for memory_s in (_LEARNING_S, _CHANGE_S))
         slot = self._push(frame)
         if self._seen >= 3:
             # light that moves steadily has no second difference
-            self._independent.take(_LIBRARY.bend(self._at, slot), dt)
+            self._independent.take(_LIBRARY.bend(self._at, slot), learning)
         for mean in self._means:
-            self._shown[mean].take(shown[mean], dt)
-            self._lately[mean].take(shown[mean], dt)
-            self._averaged[mean].take(averaged[mean], dt)
+            self._shown[mean].take(shown[mean], learning)
+            self._lately[mean].take(shown[mean], change)
+            self._averaged[mean].take(averaged[mean], learning)
 
     def left(self, which: int) -> float:
         """Share of a frame's variance that is left in a mean, beside what averaging leaves of the independent share.
@@ -114,14 +113,14 @@ class CommonError:
 
 
 class _Average:
-    """An average over the last second or, at first, over all there is."""
+    """An average with fading weights or, at first, over all there is."""
 
-    def __init__(self, memory_s: float) -> None:
+    __slots__ = ("_count", "value")
+
+    def __init__(self) -> None:
         self.value = 0.0
-        self._memory_s = memory_s
         self._count = 0
 
-    def take(self, value: float, dt: float) -> None:
+    def take(self, value: float, share: float) -> None:
         self._count += 1
-        share = max(1.0 - math.exp(-dt / self._memory_s), 1.0 / self._count)
-        self.value += share * (value - self.value)
+        self.value += max(share, 1.0 / self._count) * (value - self.value)

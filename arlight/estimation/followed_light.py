@@ -59,7 +59,7 @@ class FollowedLight:
         self._moving = FadingMemory(_MOVING_MEMORY_S, *shape, trend=True)
         self._memories = (self._still, self._moving)
         self._common = CommonError(len(self._memories), *shape)
-        self._typical = TypicalError(_STILL_MEMORY_S, self._frame)
+        self._typical = TypicalError(_STILL_MEMORY_S, self._frame, self._memories)
         self._ceiling = np.tile(prior_stddev(measured.frequencies, 1.0) ** 2, (shape[0], 1))
         self._usual = 1.0
         self._level_errors = [1.0] * shape[0]
@@ -95,9 +95,8 @@ class FollowedLight:
         averaged = [memory.averaged * kept for memory, (_, _, kept) in zip(self._memories, judged, strict=True)]
         self._common.learn(self._frame, [shown for _, shown, _ in judged], averaged, dt)
         self._free_levels(share)
-        self._typical.factor(self._still)
-        for memory in self._memories:
-            memory.correct(self._typical.weigh(memory), self._frame)
+        for memory, innovation in zip(self._memories, self._typical.weigh(), strict=True):
+            memory.correct(innovation, self._frame)
         self._typical.average(dt)
         return True
 

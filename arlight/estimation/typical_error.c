@@ -2,6 +2,8 @@
 #include "cholesky.h"
 #include "relative_light.h"
 
+static const double least_freedom = 1e-3;
+
 typedef struct {
     int64_t channels;
     int64_t size;
@@ -12,11 +14,13 @@ typedef struct {
     double *scale;      /* (channels, size) the terms in which its covariance is read (`relative_light.h`) */
     double *slope;
     double *arm;
-    int64_t *factored;  /* (channels) whether correlations have a factor */
-    float *factor;      /* (channels, size, stride) Cholesky factor of correlations (`cholesky.h`) */
-    float *level;       /* (channels, stride) first row of the correlations' inverse */
+    int64_t many;       /* memories whose innovations are weighed; the first one's gain is everyone's */
+    double **memory_values;   /* (many) of (channels, size) */
+    double **memory_variance; /* (many) of (channels, size) */
+    double *innovation; /* (many, channels, size) */
     double *terms;      /* (4, size) scratch */
-    float *side;        /* (2, stride) scratch */
+    float *factor;      /* (stride, stride) scratch: Cholesky factor of one channel's correlations (`cholesky.h`) */
+    float *sides;       /* (2, many + 1, stride) scratch */
 } TypicalError;
 
 static Terms terms_of(const TypicalError *typical, int channel)
@@ -80,7 +84,7 @@ static HOT int factor_channel(const TypicalError *typical, int channel, const do
     double *restrict scale = typical->terms, *restrict slope = scale + n, *restrict arm = slope + n;
     double *restrict share = arm + n;
     const double *restrict typical_row = typical->covariance + (int64_t)at * n;
-    float *restrict row = typical->factor + (int64_t)at * stride;
+    float *restrict row = typical->factor;
     for (int j = 0; j < n; j++) {
         double precision = sqrt((1.0 - gain) / typical->variance[at + j]);
         scale[j] = terms.scale[j] * precision;
@@ -88,29 +92,21 @@ static HOT int factor_channel(const TypicalError *typical, int channel, const do
         arm[j] = terms.arm[j] * precision;
         share[j] = sqrt(gain / typical->diagonal[at + j]);
     }
-    for (int i = 0; i < n; i++, frame += n, typical_row += n, row += stride)
+    for (int i = 0; i < n; i++, frame += n, typical_row += n, row += stride) {
         for (int j = i; j < n; j++)
             row[j] = (float)(scale[i] * scale[j] * frame[j] + slope[i] * arm[j] + slope[j] * arm[i] +
                              share[i] * share[j] * typical_row[j]);
-    return factorise(n, typical->factor + (int64_t)at * stride);
-}
-
-/* Factors the correlations of a frame of covariance (channels, size, size) and of values with some variance. */
-EXPORT void factor(const TypicalError *typical, const double *frame, const double *variance)
-{
-    int n = (int)typical->size, stride = row_length(n);
-    for (int c = 0; c < typical->channels; c++) {
-        float *level = typical->level + c * stride;
-        for (int j = 0; j < stride; j++)
-            level[j] = j == 0;
-        double gain = shape_gain(typical, c, variance + c * n);
-        typical->factored[c] = factor_channel(typical, c, frame + (int64_t)c * n * n, gain);
-        if (typical->factored[c])
-            solve(n, typical->factor + (int64_t)c * n * stride, level, typical->side);
+        for (int j = n; j < stride; j++)
+            row[j] = 0.0f;
     }
+    for (int i = n; i < stride; i++, row += stride)
+        for (int j = 0; j < stride; j++)
+            row[j] = i == j;
+    return factorise(n, typical->factor);
 }
 
-/* What a level is known worse by than the rest of one channel, relative to the frame's variance of it. */
+/* What a level is known worse by than the rest of one channel, relative to the frame's variance of it; 0 where that is
+   next to nothing. */
 static double freedom(const TypicalError *typical, int channel, const double *variance)
 {
     int n = (int)typical->size;
@@ -119,18 +115,17 @@ static double freedom(const TypicalError *typical, int channel, const double *va
     for (int j = 1; j < n; j++)
         known += variance[j] / usual[j];
     double excess = variance[0] - (n > 1 ? usual[0] * known / (n - 1) : variance[0]);
-    return fmax(excess, 0.0) / typical->variance[channel * n];
+    double free = excess / typical->variance[channel * n];
+    return free > least_freedom ? free : 0.0;
 }
 
 /* Takes the shift of a free level out of decorrelated innovations y, in standard deviations; y_0 tells of nothing else
-   when the level may be anything. */
-static double level_shift(const TypicalError *typical, int channel, const double *variance, double free, float *y)
+   when the level may be anything. `level` is the first row of the correlations' inverse. */
+static double level_shift(const TypicalError *typical, int channel, const double *variance, double free,
+                          const float *restrict level, float *restrict y)
 {
     int n = (int)typical->size;
-    if (!(free > 1e-9))
-        return 0.0;
     const double *measured = typical->variance + channel * n;
-    const float *level = typical->level + channel * row_length(n);
     double both = 0.0;
     for (int j = 1; j < n; j++)
         both += 1.0 + variance[j] / measured[j];
@@ -140,20 +135,32 @@ static double level_shift(const TypicalError *typical, int channel, const double
     return shift;
 }
 
-/* Innovations of one channel as each coefficient alone should take them: U' T'^-1 innovation, U' and T' the typical
-   correlations and those that were factored, with the frame's variances. */
-static HOT void weigh_channel(const TypicalError *typical, int channel, const double *restrict values,
-                              const double *restrict variance, double *restrict innovation)
+/* Right sides of one channel: the innovations of all memories in the frame's standard deviations, and the level's
+   place. */
+static void set_sides(const TypicalError *typical, int channel)
 {
     int n = (int)typical->size, stride = row_length(n), at = channel * n;
+    float *restrict side = typical->sides;
+    for (int m = 0; m < typical->many; m++, side += stride) {
+        const double *restrict values = typical->memory_values[m] + at;
+        for (int j = 0; j < n; j++)
+            side[j] = (float)((typical->values[at + j] - values[j]) / sqrt(typical->variance[at + j]));
+        for (int j = n; j < stride; j++)
+            side[j] = 0.0f;
+    }
+    for (int j = 0; j < stride; j++)
+        side[j] = j == 0;
+}
+
+/* Innovation of one channel of a memory as each coefficient alone should take it: U' y with y the decorrelated one, U'
+   the typical correlations with the frame's variances. */
+static HOT void weigh_channel(const TypicalError *typical, int channel, const double *restrict variance,
+                              double free, const float *restrict level, float *restrict y,
+                              double *restrict innovation)
+{
+    int n = (int)typical->size, at = channel * n;
     const double *restrict measured = typical->variance + at, *restrict usual = typical->diagonal + at;
-    float *restrict y = typical->side;
-    for (int j = 0; j < n; j++)
-        y[j] = (float)((typical->values[at + j] - values[j]) / sqrt(measured[j]));
-    for (int j = n; j < stride; j++)
-        y[j] = 0.0f;
-    solve(n, typical->factor + (int64_t)channel * n * stride, y, y + stride);
-    double free = freedom(typical, channel, variance), shift = level_shift(typical, channel, variance, free, y);
+    double shift = free > 0.0 ? level_shift(typical, channel, variance, free, level, y) : 0.0;
     double *restrict weight = typical->terms;
     for (int j = 0; j < n; j++)
         weight[j] = y[j] / sqrt(usual[j]);
@@ -170,16 +177,37 @@ static HOT void weigh_channel(const TypicalError *typical, int channel, const do
     innovation[0] = share * innovation[0] + shift * sqrt(measured[0]) * (all + measured[0]) / all;
 }
 
-/* Innovations (channels, size) against values with variances, correlations and a free level being what they are. */
-EXPORT void weigh(const TypicalError *typical, const double *values, const double *variance, double *innovation)
+/* Decorrelates the innovations of one channel with a frame; 0 where the frame has no proper correlations. */
+static int decorrelate(const TypicalError *typical, int channel, const double *frame, int any_free)
 {
-    int n = (int)typical->size;
+    int n = (int)typical->size, many = (int)typical->many;
+    double gain = shape_gain(typical, channel, typical->memory_variance[0] + channel * n);
+    if (!factor_channel(typical, channel, frame + (int64_t)channel * n * n, gain))
+        return 0;
+    set_sides(typical, channel);
+    float *scratch = typical->sides + (many + 1) * row_length(n);
+    solve(n, typical->factor, many + any_free, typical->sides, scratch);
+    return 1;
+}
+
+/* Innovations of all memories with a frame of covariance (channels, size, size), correlations and free levels being
+   what they are. */
+EXPORT void weigh(const TypicalError *typical, const double *frame)
+{
+    int n = (int)typical->size, stride = row_length(n), many = (int)typical->many, any_free = 0;
     for (int c = 0; c < typical->channels; c++) {
-        int at = c * n;
-        if (typical->factored[c])
-            weigh_channel(typical, c, values + at, variance + at, innovation + at);
-        else
-            for (int j = 0; j < n; j++)
-                innovation[at + j] = typical->values[at + j] - values[at + j];
+        for (int m = 0; m < many; m++)
+            any_free |= freedom(typical, c, typical->memory_variance[m] + c * n) > 0.0;
+        int factored = decorrelate(typical, c, frame, any_free);
+        for (int m = 0; m < many; m++) {
+            double *innovation = typical->innovation + (m * typical->channels + c) * n;
+            const double *variance = typical->memory_variance[m] + c * n;
+            if (factored)
+                weigh_channel(typical, c, variance, freedom(typical, c, variance), typical->sides + many * stride,
+                              typical->sides + m * stride, innovation);
+            else
+                for (int j = 0; j < n; j++)
+                    innovation[j] = typical->values[c * n + j] - typical->memory_values[m][c * n + j];
+        }
     }
 }

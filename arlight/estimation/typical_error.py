@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from arlight.estimation.memory import FadingMemory
 from arlight.estimation.relative_light import RelativeLight
-from arlight.native import Workspace, address, library
+from arlight.native import Workspace, library
 
 Array = NDArray[np.float64]
 
@@ -22,14 +22,10 @@ _LIBRARY = library(__file__, "typical_error")
 _LIBRARY.average.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
 _LIBRARY.uncertainty.argtypes = [ctypes.c_void_p]
 _LIBRARY.uncertainty.restype = ctypes.c_double
-_LIBRARY.factor.argtypes = [ctypes.c_void_p] * 3
-_LIBRARY.weigh.argtypes = [ctypes.c_void_p] * 4
+_LIBRARY.weigh.argtypes = [ctypes.c_void_p] * 2
 _LANES = 16
 """Floats by which rows of factors are padded (cholesky.h)."""
-_ARRAYS = (
-    "covariance", "diagonal", "values", "variance", "scale", "slope", "arm", "factored", "factor", "level", "terms",
-    "side",
-)  # fmt: skip
+_FRAME = ("values", "variance", "scale", "slope", "arm")
 
 
 class _Workspace(Workspace):
@@ -38,7 +34,10 @@ class _Workspace(Workspace):
     _fields_ = (
         ("channels", ctypes.c_int64),
         ("size", ctypes.c_int64),
-        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_void_p) for name in ("covariance", "diagonal", *_FRAME)),
+        ("many", ctypes.c_int64),
+        *((name, ctypes.POINTER(ctypes.c_void_p)) for name in ("memory_values", "memory_variance")),
+        *((name, ctypes.c_void_p) for name in ("innovation", "terms", "factor", "sides")),
     )
 
 
@@ -48,30 +47,35 @@ class TypicalError:
     Args:
         memory_s: time over which covariances are averaged [s].
         frame: the relative light of the frames, which is taken anew for each.
+        memories: whose innovations are weighed.
     """
 
-    def __init__(self, memory_s: float, frame: RelativeLight) -> None:
+    def __init__(self, memory_s: float, frame: RelativeLight, memories: tuple[FadingMemory, ...]) -> None:
         self._memory_s = memory_s
         self._frame = frame
+        # their arrays are pointed at
+        self._memories = memories
         channels, size = frame.values.shape
         stride = -(-size // _LANES) * _LANES
         self.covariance = np.zeros((channels, size, size))
         """(c, n, n) of relative light."""
         self.diagonal = np.zeros((channels, size))
         """(c, n) its variances."""
-        self._innovation = np.zeros((channels, size))
-        self._innovation_at = address(self._innovation, np.float64)
+        self._innovation = np.zeros((len(memories), channels, size))
+        pointers = ctypes.c_void_p * len(memories)
         self._workspace = _Workspace(channels, size)
+        self._workspace.many = len(memories)
+        self._workspace.memory_values = pointers(*(memory.values_at for memory in memories))
+        self._workspace.memory_variance = pointers(*(memory.variance_at for memory in memories))
         self._workspace.hold(
             {
                 "covariance": self.covariance,
                 "diagonal": self.diagonal,
-                **{name: getattr(frame, name) for name in ("values", "variance", "scale", "slope", "arm")},
-                "factored": np.zeros(channels, np.int64),
-                "factor": np.zeros((channels, size, stride), np.float32),
-                "level": np.zeros((channels, stride), np.float32),
+                **{name: getattr(frame, name) for name in _FRAME},
+                "innovation": self._innovation,
                 "terms": np.zeros((4, size)),
-                "side": np.zeros((2, stride), np.float32),
+                "factor": np.zeros((stride, stride), np.float32),
+                "sides": np.zeros((2, len(memories) + 1, stride), np.float32),
             }
         )
         self._at = ctypes.byref(self._workspace)
@@ -89,15 +93,11 @@ class TypicalError:
         self._weight = faded + weight
         _LIBRARY.average(self._at, self._frame.covariance_at, faded / self._weight, weight / self._weight)
 
-    def factor(self, memory: FadingMemory) -> None:
-        """Factor the correlations of the frame's distance from a memory's values, before innovations are weighed."""
-        _LIBRARY.factor(self._at, self._frame.covariance_at, memory.variance_at)
-
-    def weigh(self, memory: FadingMemory) -> Array:
-        """Innovation (c, n) of the frame that each of a memory's numbers should take in by itself.
+    def weigh(self) -> Array:
+        """Innovations (memories, c, n) of the frame that each of the memories' numbers should take in by itself.
 
         A level that is less certain than the rest, as after a change of exposure, first takes what only its shift
         explains; the array is overwritten by the next call.
         """
-        _LIBRARY.weigh(self._at, memory.values_at, memory.variance_at, self._innovation_at)
+        _LIBRARY.weigh(self._at, self._frame.covariance_at)
         return self._innovation

@@ -26,7 +26,7 @@ def relative(lighting, exposure=ONES):
     """The relative light and its covariance (3, n, n)."""
     taken = RelativeLight(3, SIZE)
     taken.take(lighting, exposure)
-    typical = TypicalError(1.0, taken)
+    typical = TypicalError(1.0, taken, ())
     typical.start()
     np.testing.assert_allclose(taken.variance, np.einsum("cii->ci", typical.covariance), rtol=1e-9)
     return taken, typical.covariance

@@ -31,7 +31,8 @@ class Scene:
         self.values = 0.2 * generator.normal(size=(3, self.size))
         self.values[:, 0] = [1.5, 1.0, 0.7]
         self.light = RelativeLight(3, self.size)
-        self.typical = TypicalError(1.5, self.light)
+        self.memories = tuple(FadingMemory(1.5, 3, self.size, trend=False) for _ in range(2))
+        self.typical = TypicalError(1.5, self.light, self.memories)
 
     def covariance(self, seed, samples):
         shape = correlations(self.size, seed, self.size + samples)
@@ -67,13 +68,11 @@ def test_the_average_is_that_of_the_covariances_by_their_certainty(order):
     np.testing.assert_allclose(scene.typical.diagonal, np.einsum("cii->ci", expected), rtol=1e-8)
 
 
-def memory_of(scene, known, free_level=(0.0, 0.0, 0.0)):
+def remember(scene, memory, known, free_levels=(0.0, 0.0, 0.0)):
     """Values whose covariance is a part of the typical one."""
-    memory = FadingMemory(1.5, 3, scene.size, trend=False)
     memory.start(scene.values, known * scene.deviation**2, np.ones((3, scene.size)))
-    for channel, variance in enumerate(free_level):
+    for channel, variance in enumerate(free_levels):
         memory.free_level(channel, variance)
-    return memory
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -86,16 +85,17 @@ def test_with_one_gain_it_is_the_kalman_filter_of_the_vector(order, known, free)
     scene.typical.start()
     found = scene.values + 2.0 * scene.deviation * np.random.default_rng(6).normal(size=scene.values.shape)
     scene.show(found, measured)
-    memory = memory_of(scene, known, (free, 0.0, 0.5 * free))
-    scene.typical.factor(memory)
-    memory.correct(scene.typical.weigh(memory), scene.light)
-    for c, freed in enumerate((free, 0.0, 0.5 * free)):
-        prior = known * typical[c]
-        prior[0, 0] += freed
-        if scene.size == 1:
-            prior = known * typical[c] + freed
-        expected = scene.values[c] + prior @ np.linalg.solve(prior + measured[c], found[c] - scene.values[c])
-        np.testing.assert_allclose(memory.values[c], expected, atol=2e-4 * scene.deviation.mean())
+    # the second memory shares the first one's factor, which is its own where as much is known
+    freedoms = ((free, 0.0, 0.5 * free), (0.0, 3.0 * free, 0.0))
+    for memory, freed in zip(scene.memories, freedoms, strict=True):
+        remember(scene, memory, known, freed)
+    for memory, innovation, freed in zip(scene.memories, scene.typical.weigh(), freedoms, strict=True):
+        memory.correct(innovation, scene.light)
+        for c in range(3):
+            prior = known * typical[c]
+            prior[0, 0] += freed[c]
+            expected = scene.values[c] + prior @ np.linalg.solve(prior + measured[c], found[c] - scene.values[c])
+            np.testing.assert_allclose(memory.values[c], expected, atol=2e-4 * scene.deviation.mean())
 
 
 def test_what_cannot_be_factored_is_taken_number_by_number():
@@ -107,9 +107,12 @@ def test_what_cannot_be_factored_is_taken_number_by_number():
     broken[1, 3, 5] = broken[1, 5, 3] = 3.0 * np.sqrt(covariance[1, 3, 3] * covariance[1, 5, 5])
     found = scene.values + scene.deviation
     scene.show(found, broken)
-    memory = memory_of(scene, 0.1)
-    scene.typical.factor(memory)
-    innovation = scene.typical.weigh(memory)
-    np.testing.assert_allclose(innovation[1], found[1] - scene.values[1], rtol=1e-9)
-    # the other channels are what they were; equal correlations cancel
-    np.testing.assert_allclose(innovation[::2], (found - scene.values)[::2], rtol=1e-3)
+    for memory in scene.memories:
+        remember(scene, memory, 0.1)
+    for _ in range(2):
+        for innovation in scene.typical.weigh():
+            np.testing.assert_allclose(innovation[1], found[1] - scene.values[1], rtol=1e-9)
+            # equal correlations cancel, in the other channels and in the next frame
+            np.testing.assert_allclose(innovation[::2], (found - scene.values)[::2], rtol=1e-3)
+    scene.show(found, covariance)
+    np.testing.assert_allclose(scene.typical.weigh()[0], found - scene.values, rtol=1e-3)
