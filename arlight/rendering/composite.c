@@ -1,7 +1,10 @@
 /* Differential rendering in linear light: the plane darkens by a ratio, the object covers. */
 #include "native.h"
 
-enum { CELL = 8 }; /* pixels between two nodes of the net of rays, as in composite.py */
+enum {
+    CELL = 8,     /* pixels between two nodes of the net of rays, as in composite.py */
+    STRETCH = 16, /* cells of a row that are looked up before they are multiplied */
+};
 
 typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
@@ -27,41 +30,52 @@ static inline void texels_of_cell(const Plane *p, int64_t column, int64_t y, flo
     }
 }
 
-/* Multiply a pixel by the bilinear ratio at a texel that lies on the map. */
-static inline void darken(const Plane *p, float *pixel, float u, float v)
+/* Texels (u, v) of a cell's pixels; u is negative where they do not see the plane. */
+static inline void texels_of_pixels(const float start[3], const float change[3], float *restrict u, float *restrict v)
 {
+#pragma GCC unroll 1
+    for (int i = 0; i < CELL; i++) {
+        float share = (float)i / CELL, w = start[2] + share * change[2], inverse = 1.0f / w;
+        float across = (start[0] + share * change[0]) * inverse;
+        u[i] = w > 0.0f ? across : -1.0f;
+        v[i] = (start[1] + share * change[1]) * inverse;
+    }
+}
+
+/* The ratio at a texel (u, v), bilinear; 1 outside of the map. */
+static inline Four ratio_at(const Plane *p, float last, float u, float v)
+{
+    if (!(u >= 0.0f && u < last && v >= 0.0f && v < last))
+        return (Four){1.0f, 1.0f, 1.0f, 1.0f};
     int32_t column = (int32_t)u, row = (int32_t)v;
     const Four *texel = (const Four *)p->ratio + row * p->side + column;
     float fu = u - (float)column, fv = v - (float)row;
     Four upper = texel[0] + fu * (texel[1] - texel[0]);
     Four lower = texel[p->side] + fu * (texel[p->side + 1] - texel[p->side]);
-    Four ratio = upper + fv * (lower - upper);
-    pixel[0] *= ratio[0], pixel[1] *= ratio[1], pixel[2] *= ratio[2];
+    return upper + fv * (lower - upper);
 }
 
 /* Multiply by the ratio at each pixel's point of the plane; outside of the map, and above the horizon, by nothing. */
 EXPORT HOT void shade_plane(const Plane *p)
 {
-    float last = (float)(p->side - 1);
-    for (int64_t row = 0; row < p->height; row++) {
-        int64_t y = p->y0 + row, end = p->x0 + p->width;
-        float *pixels = p->linear + 3 * (row * p->width - p->x0);
-        for (int64_t cell = p->x0 / CELL; cell * CELL < end; cell++) {
-            float start[3], change[3], u[CELL], v[CELL];
-            texels_of_cell(p, cell, y, start, change);
-#pragma GCC unroll 1
-            for (int i = 0; i < CELL; i++) {
-                float share = (float)i / CELL, w = start[2] + share * change[2], inverse = 1.0f / w;
-                float across = (start[0] + share * change[0]) * inverse;
-                u[i] = w > 0.0f ? across : -1.0f;
-                v[i] = (start[1] + share * change[1]) * inverse;
+    float last = (float)(p->side - 1), u[CELL], v[CELL], factors[3 * CELL * STRETCH + 1];
+    int64_t end = p->x0 + p->width;
+    for (int64_t row = 0; row < p->height; row++)
+        for (int64_t cell = p->x0 / CELL; cell * CELL < end; cell += STRETCH) {
+            int64_t stop = (cell + STRETCH) * CELL < end ? STRETCH * CELL : end - cell * CELL;
+            for (int64_t i = 0; i < stop; i += CELL) {
+                float start[3], change[3];
+                texels_of_cell(p, cell + i / CELL, p->y0 + row, start, change);
+                texels_of_pixels(start, change, u, v);
+                /* the fourth number is overwritten by the next pixel's first */
+                for (int j = 0; j < CELL; j++)
+                    *(Four *)(factors + 3 * (i + j)) = ratio_at(p, last, u[j], v[j]);
             }
-            int64_t first = p->x0 - cell * CELL, stop = end - cell * CELL;
-            for (int64_t i = first > 0 ? first : 0; i < (stop < CELL ? stop : CELL); i++)
-                if (u[i] >= 0.0f && u[i] < last && v[i] >= 0.0f && v[i] < last)
-                    darken(p, pixels + 3 * (cell * CELL + i), u[i], v[i]);
+            int64_t first = cell * CELL < p->x0 ? p->x0 - cell * CELL : 0;
+            float *pixels = p->linear + 3 * (row * p->width + cell * CELL - p->x0);
+            for (int64_t i = 3 * first; i < 3 * stop; i++)
+                pixels[i] *= factors[i];
         }
-    }
 }
 
 /* Lay radiance times coverage, and coverage, (height, width, 4) over linear light whose rows are `stride` pixels long. */

@@ -31,6 +31,8 @@ class Mesh:
     """(layers, h, w, 3) sRGB images, row 0 at the top; None without textures."""
     closed: bool = False
     """Whether its faces enclose a volume, so that those turned away from the camera cannot be seen."""
+    box_mm: Array | None = None
+    """(2, 3) corners of the box of what the mesh stands for, where that is not the vertices' own."""
 
     def __post_init__(self) -> None:
         if len(self.faces) == 0 or len(self.vertices_mm) == 0:
@@ -50,7 +52,7 @@ class Mesh:
     @property
     def extent_mm(self) -> Array:
         """(3,) size of the bounding box along x, y and z."""
-        return np.ptp(self.vertices_mm, axis=0)
+        return np.ptp(self.vertices_mm if self.box_mm is None else self.box_mm, axis=0)
 
     def placed(self, size_mm: float, position_mm: tuple[float, float] = (0.0, 0.0), yaw_deg: float = 0.0) -> "Mesh":
         """Scaled to `size_mm`, turned, and set on the sheet.
@@ -67,16 +69,24 @@ class Mesh:
             raise MeshError(f"the object's size must be a positive length in millimetres, found {size_mm}")
         c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        vertices = (self.vertices_mm * (size_mm / self.extent_mm.max())) @ turn.T
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        scale = size_mm / self.extent_mm.max()
+        vertices = (self.vertices_mm * scale) @ turn.T
+        held = vertices if self.box_mm is None else (self._box_corners() * scale) @ turn.T
+        low, high = held.min(axis=0), held.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]])
         vertices = vertices - origin + [*position_mm, 0.0]
-        return replace(self, vertices_mm=vertices, normals=self.normals @ turn.T)
+        return replace(self, vertices_mm=vertices, normals=self.normals @ turn.T, box_mm=None)
 
     def standing_upright(self) -> "Mesh":
         """A mesh whose up axis is y (glTF, most OBJ files) turned so that z is up."""
         turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-        return replace(self, vertices_mm=self.vertices_mm @ turn.T, normals=self.normals @ turn.T)
+        box = None if self.box_mm is None else self.box_mm @ turn.T
+        return replace(self, vertices_mm=self.vertices_mm @ turn.T, normals=self.normals @ turn.T, box_mm=box)
+
+    def _box_corners(self) -> Array:
+        """(8, 3) corners of `box_mm`."""
+        low, high = np.asarray(self.box_mm)
+        return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def joined(parts: list[Mesh]) -> Mesh:

@@ -12,6 +12,7 @@ from arlight.rendering.gloss import GLOSS_SIDE
 from arlight.rendering.light_rows import LightRows
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.projection import View
+from arlight.rendering.refinement import Refinement
 from arlight.rendering.transfer import Transfer
 
 Image = NDArray[np.float32]
@@ -28,9 +29,9 @@ for _function, _types in ((_shade, 1), (_raster.draw, 1), (_raster.resolve, 2)):
 
 class _Shading(Workspace):
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("position_mm", "normal", "base_colour", "openness", "matte", "gloss")),
-        *((name, ctypes.c_void_p) for name in ("body", "mirrored", "scratch")),
-        *((name, ctypes.c_int64) for name in ("count", "stride", "side")),
+        *((name, ctypes.c_void_p) for name in ("position_mm", "normal", "base_colour", "openness", "lit", "gloss")),
+        *((name, ctypes.c_void_p) for name in ("ends", "matte", "body", "mirrored", "scratch")),
+        *((name, ctypes.c_int64) for name in ("count", "lit_count", "stride", "side")),
         ("eye_mm", ctypes.c_double * 3),
         *((name, ctypes.c_double) for name in ("roughness", "normal_reflectance")),
     )
@@ -59,6 +60,7 @@ class RasterRenderer:
         normal_reflectance: float,
         supersampling: int = 2,
         independent: NDArray[np.float64] | None = None,
+        refinement: Refinement | None = None,
     ) -> None:
         """Take down the mesh.
 
@@ -70,18 +72,26 @@ class RasterRenderer:
             normal_reflectance: Fresnel reflectance at normal incidence, 0 for a matte object.
             supersampling: samples along a pixel's side.
             independent: as `LightRows` takes it, to predict coefficients that are not given.
+            refinement: of the mesh: what is drawn, and projected for it, in the mesh's place.
         """
         self._rows = LightRows([transfer.vertex_rows, gloss_rows], independent)
+        lit_count, openness = len(mesh.vertices_mm), transfer.openness
+        ends = np.empty((0, 2), np.int32)
+        if refinement is not None:
+            mesh, ends, openness = refinement.mesh, refinement.ends, refinement.carried(openness)
         n = len(mesh.vertices_mm)
         planes = {"position_mm": mesh.vertices_mm, "normal": mesh.normals}
-        self._shading = _Shading(count=n, side=GLOSS_SIDE, roughness=roughness, normal_reflectance=normal_reflectance)
+        self._shading = _Shading(
+            count=n, lit_count=lit_count, side=GLOSS_SIDE, roughness=roughness, normal_reflectance=normal_reflectance
+        )
         self._shading.hold(
             {name: np.ascontiguousarray(values.T, np.float32) for name, values in planes.items()}
             | {"base_colour": np.ascontiguousarray(mesh.base_colour.T, np.float32)}
-            | {"openness": np.ascontiguousarray(transfer.openness.T, np.float32)}
+            | {"openness": np.ascontiguousarray(openness.T, np.float32)}
         )
         lit = {"body": np.empty((3, n), np.float32), "mirrored": np.empty((3, n), np.float32)}
-        self._shading.hold(lit | {"scratch": np.empty((4, n), np.float32)})
+        own = {"ends": np.ascontiguousarray(ends), "matte": np.empty((3, n), np.float32)}
+        self._shading.hold(lit | own | {"scratch": np.empty((4, n), np.float32)})
         self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed, samples=supersampling)
         corners = np.zeros((n, _CORNER), np.float32)
         self._raster.hold(lit | {"faces": np.ascontiguousarray(mesh.faces, np.int32), "corners": corners})
@@ -122,7 +132,7 @@ class RasterRenderer:
     def _shade(self, view: View, packed: NDArray[np.float32]) -> None:
         shading = self._shading
         matte, gloss = self._rows.light(packed)
-        shading.matte, shading.gloss = matte.ctypes.data, gloss.ctypes.data
+        shading.lit, shading.gloss = matte.ctypes.data, gloss.ctypes.data
         shading.stride = matte.strides[0] // matte.itemsize
         shading.eye_mm[:] = view.camera_from_probe.camera_centre_mm.tolist()
         _shade(ctypes.byref(shading))

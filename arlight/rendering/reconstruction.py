@@ -38,8 +38,8 @@ class Reconstruction:
     prior_weights: Array
     """(n, m) A^T (A C A^T + S)^-1, from which the row of any direction follows."""
     independent: Array
-    """(m, m) lower triangle L, L L^T = A C A^T + S: coefficients are L times independent parts of unit variance, and the
-    first of these follow from the first of those."""
+    """(m, m) lower triangle L, L L^T = A C A^T + S: coefficients are L times independent parts of unit variance, and
+    the first of these follow from the first of those."""
     surroundings_albedo: float
     """Assumed albedo of what lies around and under the object, in [0, 1]."""
 

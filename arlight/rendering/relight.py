@@ -16,6 +16,7 @@ from arlight.rendering.mesh import Mesh
 from arlight.rendering.projection import Projector, View, union
 from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.reconstruction import reconstruct
+from arlight.rendering.refinement import refined
 from arlight.rendering.settings import RelightSettings
 from arlight.rendering.shadow import dark_texels, irradiance_ratio
 from arlight.rendering.transfer import precompute_transfer
@@ -94,7 +95,9 @@ class Relighter:
         self._plane_rows = LightRows([shadow.hidden_rows, shadow.open_row[None]], self._reconstruction.independent)
         self._plane_shader = PlaneShader(camera, shadow.grid)
         self._projector = Projector(camera)
-        self._vertices = np.ascontiguousarray(self.mesh.vertices_mm, np.float32)
+        self._refinement = refined(self.mesh) if self._refines() else None
+        drawn = self.mesh if self._refinement is None else self._refinement.mesh
+        self._vertices = np.ascontiguousarray(drawn.vertices_mm, np.float32)
         self._opened: ObjectDrawer | None = None
 
     def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
@@ -166,7 +169,12 @@ class Relighter:
             from arlight.rendering.draw import ObjectRenderer
 
             return ObjectRenderer(self.mesh, self.transfer, *material)
-        return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent)
+        return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent, self._refinement)
+
+    def _refines(self) -> bool:
+        """Whether there are triangles to spare; the other renderers draw the mesh as it is lit."""
+        budget = self.settings.mesh_faces
+        return self.settings.renderer == "native" and (budget is None or 4 * len(self.mesh.faces) <= budget)
 
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
         count = len(lighting.frequencies)

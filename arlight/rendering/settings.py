@@ -28,6 +28,8 @@ class RelightSettings:
     """Side of the map of the shadow on the sheet."""
     supersampling: int = 2
     """Samples along a pixel's side."""
+    mesh_faces: int | None = 16_000
+    """Triangles to draw. A mesh of at most a quarter of them is refined after it is lit; None refines any mesh."""
     renderer: RendererName = "native"
     """`native`: precomputed transfer, drawn by compiled code; `moderngl`: the same by OpenGL, with the gloss of every
     pixel; `pyrender`: the light as a few directional lights with shadow maps, slow."""

@@ -9,12 +9,14 @@ typedef struct {
     const float *normal;      /* (3, n) */
     const float *base_colour; /* (3, n) */
     const float *openness;    /* (9, n) visibility, real spherical harmonics of the second order */
-    const float *matte;       /* (3, stride) radiance of a white matte surface */
+    const float *lit;         /* (3, stride) radiance of a white matte surface at the first `lit_count` vertices */
     const float *gloss;       /* (3, stride) octahedral map (side, side) of lobe-averaged radiance */
+    const int32_t *ends;      /* (count - lit_count, 2) the two among those that each further vertex lies between */
+    float *matte;             /* (3, n) of all of them */
     float *body;              /* (3, n) radiance of the body before its texture */
     float *mirrored;          /* (3, n) radiance of the gloss */
     float *scratch;           /* (4, n) place on the map, visibility there, gloss albedo */
-    int64_t count, stride, side;
+    int64_t count, lit_count, stride, side;
     double eye_mm[3], roughness, normal_reflectance;
 } Shading;
 
@@ -77,12 +79,26 @@ static inline void reflect(const Shading *s)
     }
 }
 
+/* Light of one colour at the vertices that have none of their own. */
+static inline void carry(const Shading *s, int channel)
+{
+    const float *lit = s->lit + channel * s->stride;
+    const int32_t *ends = s->ends;
+    float *restrict matte = s->matte + channel * s->count;
+    memcpy(matte, lit, (size_t)s->lit_count * sizeof *matte);
+    matte += s->lit_count;
+    int64_t further = s->count - s->lit_count;
+#pragma GCC ivdep
+    for (int64_t i = 0; i < further; i++)
+        matte[i] = 0.5f * (lit[ends[2 * i]] + lit[ends[2 * i + 1]]);
+}
+
 /* Mix one colour of the body's light with what the gloss mirrors, bilinear on its map. */
 static inline void mix(const Shading *s, int channel)
 {
     int64_t n = s->count;
     const float *u = s->scratch, *v = s->scratch + n, *open = s->scratch + 2 * n, *albedo = s->scratch + 3 * n;
-    const float *map = s->gloss + channel * s->stride, *matte = s->matte + channel * s->stride;
+    const float *map = s->gloss + channel * s->stride, *matte = s->matte + channel * n;
     const float *base = s->base_colour + channel * n;
     float *restrict body = s->body + channel * n, *restrict mirrored = s->mirrored + channel * n;
     int32_t side = (int32_t)s->side;
@@ -102,5 +118,5 @@ EXPORT HOT void shade(const Shading *s)
 {
     reflect(s);
     for (int channel = 0; channel < 3; channel++)
-        mix(s, channel);
+        carry(s, channel), mix(s, channel);
 }
