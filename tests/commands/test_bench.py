@@ -16,6 +16,8 @@ def point(name, cost, error, is_preset):
         "name": name,
         "is_preset": is_preset,
         "cost_ms": {"median": cost, "low": cost, "high": cost, "count": 3},
+        "stages_ms": {"track": cost / 2, "relight": cost / 2},
+        "estimate_over_aruco": {"median": 0.1, "low": 0.1, "high": 0.1, "count": 3},
         "estimate_ms": cost / 2,
         "relight_ms": cost / 2,
         "relighting_error": error,

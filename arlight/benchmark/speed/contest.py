@@ -33,6 +33,16 @@ class Contender:
         return [a + b for a, b in zip(self.estimate_s, self.relight_s, strict=True)]
 
 
+@dataclass(slots=True)
+class Contest:
+    """What all contenders had in common."""
+
+    truth: list[FrameTruth] = field(default_factory=list)
+    """Of every frame that was measured."""
+    yardstick_s: list[float] = field(default_factory=list)
+    """CPU time of the yardstick on every frame [s]."""
+
+
 Judge = Callable[[int, Contender, Frame, Frame, FrameTruth], None]
 """Looks at a frame that was made: number of the contender, contender, frame, composite, truth."""
 
@@ -42,8 +52,9 @@ def contend(
     frames: int,
     contenders: Sequence[Contender],
     judge: Judge | None = None,
+    yardstick: Callable[[Frame], object] | None = None,
     clock: Clock = process_time,
-) -> list[FrameTruth]:
+) -> Contest:
     """Play a clip to all contenders; costs and estimates after the warm-up stay with them.
 
     Args:
@@ -51,16 +62,18 @@ def contend(
         frames: how many are measured.
         contenders: take turns with every frame.
         judge: sees every frame that is measured.
+        yardstick: takes its turn with every frame too.
         clock: CPU time of the process [s].
-
-    Returns:
-        The truth of the frames that were measured.
     """
-    measured = []
+    contest = Contest()
     with single_threaded():
         for frame, truth in clip.played(WARM_UP + frames):
+            begun = clock()
+            if yardstick is not None:
+                yardstick(frame)
             if frame.index >= WARM_UP:
-                measured.append(truth)
+                contest.yardstick_s.append(clock() - begun)
+                contest.truth.append(truth)
             for number, contender in enumerate(contenders):
                 begun = clock()
                 estimate = contender.tracker.update(frame)
@@ -77,9 +90,9 @@ def contend(
                 contender.estimates.append(estimate)
                 if judge is not None:
                     judge(number, contender, frame, composite, truth)
-    return measured
+    return contest
 
 
 def contender(clip: FilmedClip, settings: TrackerSettings, relighter: Relighter | None) -> Contender:
-    """Someone to contend on a clip."""
-    return Contender(LightingTracker(clip.probe, clip.camera, settings), relighter)
+    """Someone to contend on a clip; the estimate's stages are told in CPU time."""
+    return Contender(LightingTracker(clip.probe, clip.camera, settings, clock=process_time), relighter)

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from arlight.benchmark.speed.clip_errors import coefficient_errors, relative_rms, rms, true_lighting
 from arlight.benchmark.speed.contest import Contender, contend, contender
-from arlight.benchmark.speed.findings import Findings
+from arlight.benchmark.speed.findings import Findings, Ratio
 from arlight.benchmark.speed.front_settings import FrontSetting
 from arlight.benchmark.speed.playback import FilmedClip
 from arlight.benchmark.speed.relighters import FINEST, Relighters
-from arlight.benchmark.speed.spread import Spread, spread
+from arlight.benchmark.speed.spread import Spread, paired_ratio, spread
+from arlight.benchmark.speed.yardsticks import ArucoPose
 from arlight.synthetic.truth import FrameTruth
 from arlight.video.frame import Frame, Region
 
@@ -31,6 +32,10 @@ class FrontPoint:
     """Whether it is a preset."""
     cost_ms: Spread
     """CPU time a frame, from tracking to the composite [ms]."""
+    stages_ms: dict[str, float]
+    """Its parts, medians [ms]."""
+    estimate_over_aruco: Spread
+    """Pose and light, relative to ArUco's detection and solvePnP on the same frames."""
     estimate_ms: float
     """Its part for pose and light, median [ms]."""
     relight_ms: float
@@ -66,6 +71,8 @@ def measure_front(
     for point, on_front in zip(points, best, strict=True):
         found.details["front"].append({**asdict(point), "on_front": bool(on_front)})
         if point.is_preset:
+            ratio = Ratio(point.estimate_over_aruco, ArucoPose.name, point.estimate_ms)
+            found.ratios[f"track to filter, preset {point.name}"] = ratio
             found.errors[f"relit picture, preset {point.name}"] = point.relighting_error
             found.errors[f"light, preset {point.name}"] = point.coefficient_error
     return found
@@ -76,6 +83,7 @@ class _Row:
     """One setting on one clip."""
 
     contender: Contender
+    aruco_s: list[float]
     picture_error: float
     coefficients: float
     by_order: tuple[float, ...]
@@ -93,11 +101,12 @@ def _measure_clip(
         for setting in settings
     ]
     judge = _PictureJudge(clip, relighters, len(settings))
-    truth = contend(clip, frames, contenders, judge)
+    aruco = ArucoPose(clip.probe, clip.camera)
+    contest = contend(clip, frames, contenders, judge, lambda frame: aruco.pose(frame.luma()))
     rows = []
     for each, errors in zip(contenders, judge.errors, strict=True):
-        light = coefficient_errors([estimate.lighting for estimate in each.estimates], truth, clip.probe)
-        rows.append(_Row(each, float(np.median(errors)), light.together, light.orders))
+        light = coefficient_errors([estimate.lighting for estimate in each.estimates], contest.truth, clip.probe)
+        rows.append(_Row(each, contest.yardstick_s, float(np.median(errors)), light.together, light.orders))
     return rows
 
 
@@ -107,12 +116,24 @@ def _point(setting: FrontSetting, rows: Sequence[_Row]) -> FrontPoint:
         name=setting.name,
         is_preset=setting.is_preset,
         cost_ms=spread(first.frame_s).scaled(1e3),
+        stages_ms=_stages_ms(first),
+        estimate_over_aruco=paired_ratio(first.estimate_s, rows[0].aruco_s),
         estimate_ms=1e3 * spread(first.estimate_s).median,
         relight_ms=1e3 * spread(first.relight_s).median,
         relighting_error=rms(np.array([row.picture_error for row in rows])),
         coefficient_error=rms(np.array([row.coefficients for row in rows])),
         error_by_order=rows[0].by_order,
     )
+
+
+def _stages_ms(contender: Contender) -> dict[str, float]:
+    """Median CPU time of every stage [ms]."""
+    stages: dict[str, list[float]] = {}
+    for estimate in contender.estimates:
+        for stage, seconds in estimate.timings_s.items():
+            stages.setdefault(stage, []).append(seconds)
+    stages["relight"] = contender.relight_s
+    return {stage: 1e3 * spread(seconds).median for stage, seconds in stages.items()}
 
 
 class _PictureJudge:

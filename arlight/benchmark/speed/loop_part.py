@@ -42,13 +42,14 @@ def measure_loop(
     repeat_clip(clip.path, short, float(_WARM_UP_FRAMES / FRAME_RATE))
     count = repeat_clip(clip.path, long, float(frames / FRAME_RATE))
     pipeline = Pipeline(clip.probe, clip.camera, relighter, preset.tracker)
-    _run(short, clip, pipeline, preset.encoding, folder)
+    _run(short, clip, pipeline, preset.encoding, folder, {})
     loop_s, loop_cpu_s, transcode_s = [], [], []
+    stages_ms: dict[str, list[float]] = {}
     for _ in range(repeats):
         transcode_s.append(_transcode(long, preset.encoding, folder / "transcoded.mp4"))
         pipeline.reset()
         cpu_s = process_time()
-        loop_s.append(_run(long, clip, pipeline, preset.encoding, folder))
+        loop_s.append(_run(long, clip, pipeline, preset.encoding, folder, stages_ms))
         loop_cpu_s.append(process_time() - cpu_s)
     name, ratio = f"loop, {clip.workload.name}", paired_ratio(loop_s, transcode_s)
     found = Findings(ratios={name: Ratio(ratio, TRANSCODE, 1e3 * spread(loop_s).median / count)})
@@ -61,13 +62,21 @@ def measure_loop(
             "wall_ms": asdict(spread(loop_s).scaled(1e3 / count)),
             "cpu_ms": asdict(spread(loop_cpu_s).scaled(1e3 / count)),
             "over_transcode": asdict(ratio),
+            "stages_wall_ms": {stage: asdict(spread(values)) for stage, values in stages_ms.items()},
         }
     ]
     return found
 
 
-def _run(path: Path, clip: FilmedClip, pipeline: Pipeline, encoding: EncodingSettings, folder: Path) -> float:
-    """Wall time of a run over a clip [s]."""
+def _run(
+    path: Path,
+    clip: FilmedClip,
+    pipeline: Pipeline,
+    encoding: EncodingSettings,
+    folder: Path,
+    stages_ms: dict[str, list[float]],
+) -> float:
+    """Wall time of a run over a clip [s]; that of every frame's stages is added to those known [ms]."""
     with VideoReader(path) as reader:
         begun = perf_counter()
         with Sinks() as sinks:
@@ -75,8 +84,9 @@ def _run(path: Path, clip: FilmedClip, pipeline: Pipeline, encoding: EncodingSet
             header = LogHeader.of(clip.probe, clip.camera, path.name, "probe.json")
             sinks.log = LightingLogWriter(folder / "light.jsonl", header)
             with frame_loop(reader, pipeline, sinks) as records:
-                for _record in records:
-                    pass
+                for record in records:
+                    for stage, ms in record.timings_ms.items():
+                        stages_ms.setdefault(stage, []).append(ms)
         return perf_counter() - begun
 
 

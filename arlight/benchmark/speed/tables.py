@@ -26,7 +26,7 @@ def benchmark_tables(found: Findings) -> list[Table]:
         tables.append(_workload_table(found))
     tables.append(_stage_table(found))
     if found.details.get("front"):
-        tables.append(_front_table(found))
+        tables += [_preset_table(found), _front_table(found)]
     return tables
 
 
@@ -91,6 +91,23 @@ def _stage_table(found: Findings) -> Table:
         value = ratio.value
         table.add_row(
             name, f"{value.median:.3f}", f"{value.low:.3f}-{value.high:.3f}", ratio.over, f"{ratio.cost_ms:.2f}"
+        )
+    return table
+
+
+def _preset_table(found: Findings) -> Table:
+    presets = [point for point in found.details["front"] if point["is_preset"]]
+    stages, orders = list(presets[0]["stages_ms"]), range(len(presets[0]["error_by_order"]))
+    table = Table(title="presets: CPU ms by stage; error by order, % of |L_0|")
+    for name in ("preset", "estimate over ArUco", *stages, *(f"order {order}" for order in orders), "relit picture %"):
+        table.add_column(name, justify="left" if name == "preset" else "right")
+    for point in presets:
+        table.add_row(
+            point["name"],
+            f"{point['estimate_over_aruco']['median']:.3f}",
+            *(f"{point['stages_ms'][stage]:.2f}" for stage in stages),
+            *(_percent(error) for error in point["error_by_order"]),
+            _percent(point["relighting_error"]),
         )
     return table
 

@@ -77,6 +77,8 @@ def test_all_points_are_measured_and_coarser_ones_are_worse(clip):
     assert blocky["coefficient_error"] == fine["coefficient_error"]
     assert all(point["cost_ms"]["count"] == 8 for point in found.details["front"])
     # only what users know by name is gated
+    assert set(found.ratios) == {"track to filter, preset fine"}
+    assert set(fine["stages_ms"]) == {"track", "measure", "estimate", "filter", "relight"}
     assert found.errors == {
         "relit picture, preset fine": fine["relighting_error"],
         "light, preset fine": fine["coefficient_error"],
