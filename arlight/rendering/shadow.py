@@ -136,10 +136,10 @@ def plane_shadow(
         directions: (d, 3) equal-area directions of the upper hemisphere.
         reconstruction: the matrix from coefficients to radiance.
     """
-    irradiance = directions[:, 2] * (2.0 * np.pi / len(directions))
-    hidden = (1.0 - seen.T.astype(np.float32) / 255.0) * irradiance.astype(np.float32)
-    openness = 1.0 - hidden.sum(axis=1) / np.pi
-    rows = hidden @ reconstruction.radiance_rows(directions).astype(np.float32)
+    irradiance = (directions[:, 2] * (2.0 * np.pi / len(directions))).astype(np.float32)
+    hidden = np.float32(1.0) - seen.astype(np.float32) * np.float32(1.0 / 255.0)
+    openness = 1.0 - irradiance @ hidden / np.pi
+    rows = hidden.T @ (irradiance[:, None] * reconstruction.radiance_rows(directions).astype(np.float32))
     return PlaneShadow(
         grid,
         (rows * _fade(grid.side).reshape(-1, 1)).astype(np.float32),

@@ -59,43 +59,58 @@ def precompute_transfer(
     lifted = mesh.vertices_mm + mesh.normals * surface_offset_mm(mesh)
     grid = PlaneShadow.grid_around(mesh, shadow_texels)
     seen = visibility(mesh, np.concatenate([lifted, grid.texel_centres_mm()]), upper, progress)
-    seen_above, seen_plane = seen[:, : len(lifted)], seen[:, len(lifted) :]
-    shadow = plane_shadow(grid, seen_plane, upper, reconstruction)
-    seen_below = visibility(mesh, lifted, lower).astype(np.float32) / 255.0
-    for i, direction in enumerate(lower):
-        seen_below[i] *= shadow.openness_along(lifted, direction)
-    above = seen_above.astype(np.float32) / 255.0
+    shadow = plane_shadow(grid, seen[:, len(lifted) :], upper, reconstruction)
+    above = _hidden(seen[:, : len(lifted)])
+    below = _hidden(visibility(mesh, lifted, lower))
+    for hidden, direction in zip(below, lower, strict=True):
+        hidden[:] = 1.0 - (1.0 - hidden) * shadow.openness_along(lifted, direction)
     return Transfer(
-        _vertex_rows(mesh.normals, above, upper, seen_below, lower, reconstruction),
-        _openness(mesh.normals, np.concatenate([above, seen_below]), np.concatenate([upper, lower])),
+        _vertex_rows(mesh.normals, above, upper, below, lower, reconstruction),
+        _openness(mesh.normals, np.concatenate([above, below]), upper, lower),
         shadow,
     )
+
+
+def _hidden(seen: NDArray[np.uint8]) -> Rows:
+    return np.float32(1.0) - seen.astype(np.float32) * np.float32(1.0 / 255.0)
 
 
 def _vertex_rows(
     normals: Array, above: Rows, upper: Array, below: Rows, lower: Array, reconstruction: Reconstruction
 ) -> Rows:
-    hidden_above = (1.0 - above).T * np.maximum(normals @ upper.T, 0.0) * (2.0 * np.pi / len(upper))
-    hidden_below = (1.0 - below).T * np.maximum(normals @ lower.T, 0.0) * (2.0 * np.pi / len(lower))
-    irradiance = reconstruction.irradiance_rows(normals) - hidden_above @ reconstruction.radiance_rows(upper)
-    irradiance -= hidden_below.sum(axis=1, keepdims=True) * reconstruction.ground_radiance_row
+    """Rows (n, m) from what is hidden, (d, n), along directions (d, 3) above and below the horizon."""
+    lost = [
+        _facing(normals, w) * hidden * np.float32(2.0 * np.pi / len(w))
+        for w, hidden in ((upper, above), (lower, below))
+    ]
+    irradiance = reconstruction.irradiance_rows(normals)
+    irradiance -= lost[0].T @ reconstruction.radiance_rows(upper).astype(np.float32)
+    irradiance -= lost[1].sum(axis=0)[:, None] * reconstruction.ground_radiance_row
     return (irradiance / np.pi).astype(np.float32)
 
 
-def _openness(normals: Array, seen: Rows, directions: Array) -> Rows:
+def _facing(normals: Array, directions: Array) -> Rows:
+    """(d, n) cosine between normals and directions, 0 behind the surface."""
+    cosine: Rows = directions.astype(np.float32) @ normals.T.astype(np.float32)
+    return np.maximum(cosine, np.float32(0.0), out=cosine)
+
+
+def _openness(normals: Array, hidden: Rows, upper: Array, lower: Array) -> Rows:
     """Least-squares harmonics of the visibility over the directions in front of each vertex, drawn toward 1."""
+    directions = np.concatenate([upper, lower])
+    solid_angle = np.repeat([2.0 * np.pi / len(upper), 2.0 * np.pi / len(lower)], [len(upper), len(lower)])
     basis = harmonics(directions)
-    solid_angle = np.full(len(directions), 4.0 * np.pi / len(directions))
-    upper = directions[:, 2] > 0
-    solid_angle[upper] = 2.0 * np.pi / np.count_nonzero(upper)
-    solid_angle[~upper] = 2.0 * np.pi / np.count_nonzero(~upper)
-    weight = np.where(normals @ directions.T > 0.0, solid_angle, 0.0)
-    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(directions), 81)
-    gram = (weight @ products).reshape(-1, 9, 9) + _RIDGE_SR * np.eye(9) / (4.0 * np.pi)
-    missing = (weight * (seen.T - 1.0)) @ basis
-    coefficients = np.linalg.solve(gram, missing[..., None])[..., 0]
-    coefficients[:, 0] += 1.0 / basis[0, 0]
-    return coefficients.astype(np.float32)
+    first, second = np.triu_indices(9)
+    front = (_facing(normals, directions) > 0.0).astype(np.float32)
+    # the Gram matrix is symmetric: its upper triangle alone is integrated
+    products = (basis[:, first] * basis[:, second] * solid_angle[:, None]).astype(np.float32)
+    gram = np.empty((len(normals), 9, 9), np.float32)
+    gram[:, first, second] = gram[:, second, first] = front.T @ products
+    gram += np.float32(_RIDGE_SR / (4.0 * np.pi)) * np.eye(9, dtype=np.float32)
+    missing = (front * hidden).T @ (basis * solid_angle[:, None]).astype(np.float32)
+    coefficients: Rows = -np.linalg.solve(gram, missing[..., None])[..., 0]
+    coefficients[:, 0] += np.float32(1.0 / basis[0, 0])
+    return coefficients
 
 
 def harmonics(directions: Array) -> Array:
