@@ -19,6 +19,7 @@ from arlight.video.frame import Frame
 from arlight.video.orientation import upright
 from arlight.video.pixel_format import PixelFormat
 from arlight.video.stream_format import ColourTags, chroma_location, colour_tags, pixel_format, planar_name
+from arlight.video.threads import codec_threads
 
 FALLBACK_RATE = Fraction(25)
 """Frames per second of a stream that states neither a rate nor times."""
@@ -94,7 +95,7 @@ class VideoReader:
         self.damage = None
         with _open(self.path) as container:
             stream = _picture_stream(container)
-            stream.thread_type = "AUTO"
+            stream.thread_type, stream.codec_context.thread_count = "AUTO", codec_threads()
             for index, picture in enumerate(self._pictures(container, stream)):
                 yield self._frame(picture, index)
 

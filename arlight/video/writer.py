@@ -22,6 +22,7 @@ from arlight.video.frame import Frame
 from arlight.video.pixel_format import CHROMA_LOCATIONS, PixelFormat, chroma_offset_px, colour_format
 from arlight.video.reader import VideoReader
 from arlight.video.stream_format import tags_of
+from arlight.video.threads import codec_threads
 
 CONTAINERS = (".mp4", ".m4v", ".mov", ".mkv")
 """Endings of the containers that keep H.264 with its own times."""
@@ -77,6 +78,7 @@ class VideoWriter:
         self._like, self._audio_wanted = like, audio
         self._rate = Fraction(frame_rate or (like.frame_rate if like else 30))
         self._time_base = like.time_base if like else DEFAULT_TIME_BASE
+        self._frame_s, self._tick_s = float(1 / self._rate), float(self._time_base)
         # no reordered frames: the container loses the last of them
         self._options = {"preset": preset, "crf": str(crf), "tune": tune, "bf": "0"}
         self._container: OutputContainer | None = None
@@ -146,6 +148,9 @@ class VideoWriter:
         try:
             self._format = encoded_format(frame)
             self._stream = self._video_stream(container, frame)
+            # one for all frames: the encoder takes a copy of what it is given
+            layout = self._stream.codec_context.pix_fmt or "yuv420p"
+            self._picture = av.VideoFrame(self._stream.width, self._stream.height, layout)
             wanted = self._like if self._audio_wanted else None
             self._audio = AudioCopy(wanted.path, container, self.path) if wanted else None
         except BaseException:
@@ -160,6 +165,7 @@ class VideoWriter:
         stream.pix_fmt = "yuv420p" if self._format.bit_depth == 8 else "yuv420p10le"
         context = stream.codec_context
         context.time_base = stream.time_base = self._time_base
+        context.thread_count = codec_threads()
         tags = tags_of(self._format, self._like.tags if self._like else None)
         context.colorspace, context.color_range, context.color_trc, context.color_primaries = tags
         if self._like and self._like.pixel_aspect:
@@ -170,15 +176,17 @@ class VideoWriter:
     def _write(self, frame: Frame) -> None:
         if frame.size != self._size:
             raise ValueError(f"expected frames of {self._size} pixels like the first one, found {frame.size}")
-        planes = frame.converted(self._format).planes
-        picture = _picture(planes, self._stream)
+        picture = self._picture
+        # a copy only should the encoder still hold the last one
+        picture.make_writable()
+        _fill(picture, frame.converted(self._format).planes)
         # two frames may not share a time: the container would refuse the second
-        ticks = max(round(Fraction(frame.time_s) / self._time_base), self._last_time + 1)
+        ticks = max(round(frame.time_s / self._tick_s), self._last_time + 1)
         picture.pts, picture.time_base, self._last_time = ticks, self._time_base, ticks
         packets = self._stream.encode(picture)
         assert self._container is not None
         if self._audio:
-            self._audio.write_until(float(frame.time_s + 1 / self._rate))
+            self._audio.write_until(frame.time_s + self._frame_s)
         self._container.mux(packets)
 
 
@@ -214,13 +222,12 @@ def _location(format_: PixelFormat) -> str:
     return next(name for name, place in CHROMA_LOCATIONS.items() if place == format_.chroma_offset_px)
 
 
-def _picture(planes: Planes, stream: VideoStream) -> av.VideoFrame:
-    """Planes as a picture for the encoder, padded to its size by repeating the edge."""
-    picture = av.VideoFrame(stream.width, stream.height, stream.codec_context.pix_fmt or "yuv420p")
+def _fill(picture: av.VideoFrame, planes: Planes) -> None:
+    """Put planes into a picture for the encoder, padded to its size by repeating the edge."""
     for target, codes in zip(picture.planes, planes, strict=True):
         memory = np.frombuffer(memoryview(target), codes.dtype).reshape(-1, target.line_size // codes.itemsize)
         h, w = codes.shape
         memory[:h, :w] = codes
-        memory[:h, w : target.width] = codes[:, -1:]
-        memory[h : target.height, : target.width] = memory[h - 1, : target.width]
-    return picture
+        if (w, h) != (target.width, target.height):
+            memory[:h, w : target.width] = codes[:, -1:]
+            memory[h : target.height, : target.width] = memory[h - 1, : target.width]

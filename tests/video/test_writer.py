@@ -146,6 +146,16 @@ def test_synthetic_frames_need_no_source(tmp_path):
     np.testing.assert_allclose(frames[0].encoded_rgb()[flat] * 255, image[flat], atol=3.0)
 
 
+@pytest.mark.parametrize("tune", ["zerolatency", "psnr"])
+def test_a_frame_that_the_encoder_holds_back_is_not_touched_by_the_next(tmp_path, tune):
+    levels = 20 + 5 * np.random.default_rng(4).permutation(40)
+    with VideoWriter(tmp_path / "out.mp4", tune=tune, preset="fast", crf=4) as writer:
+        for i, level in enumerate(levels):
+            writer.write(Frame.from_rgb(np.full((32, 48, 3), level, np.uint8), i, i / 30))
+    found = [255 * f.encoded_rgb().mean() for f in VideoReader(tmp_path / "out.mp4")]
+    np.testing.assert_allclose(found, levels, atol=1.5)
+
+
 def test_frames_that_share_a_time_are_kept_apart(tmp_path):
     with VideoWriter(tmp_path / "out.mp4") as writer:
         for i, time_s in enumerate([0.0, 0.1, 0.1, 0.05, 0.2]):
