@@ -1,240 +1,174 @@
-"""Robust weighted least squares of one colour channel: weights, blur and solution are refined together."""
+"""Robust weighted least squares of a frame's colour channels: weights, blur and solution are refined together.
 
+Unknown for each channel are the coefficients and the reflection field. Green is solved first: it is nearly luma, the
+sharpest of the three, and the reflection in red and blue follows its pattern, for it is the same mirrored scene. What
+hides a block or shines into it does so in all colours, so red and blue start from green's lamps and weights.
+"""
+
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.error_scale import next_scales, row_scale
-from arlight.estimation.lamps import BesideLamps
-from arlight.estimation.normal_equations import Beside, BlockSystem
+from arlight.estimation import lamps, robust_weights, stripe_rows
+from arlight.estimation.measured_blocks import CHANNELS, MeasuredBlocks
 from arlight.estimation.nuisance import Nuisance
-from arlight.estimation.robust_weights import block_weights
-from arlight.estimation.row_noise import RowNoise, row_noise
-from arlight.estimation.sheet_match import unexplained_share
-from arlight.estimation.stripe_rows import usable_rows
-from arlight.tracking.block_means import BlockMeans
+from arlight.estimation.prior import color_stddev, prior_stddev
+from arlight.estimation.response import BlockResponse
+from arlight.native import Workspace, library
+from arlight.tracking.block_means import ROWS
 
 Array = NDArray[np.float64]
 
-_ITERATIONS = 4
-_GAIN_DOUBT = 0.01
-"""Relative error of all that a sheet measures: of the paper's reflectance, the film's and the glass's transmittance."""
-_SPARKLE = 0.0008
-"""Usual standard deviation of what a block mirrors beside the smooth field, relative to white."""
-_EXTRA_TO_SHADING = 0.5
-"""What a block mirrors beside the smooth field, relative to how uneven the block is: a lamp's halo has a slope."""
-_EVEN = 0.005
-"""Slope that noise and codec give an even block, relative to white."""
-_FIRST_SPARKLE = 0.02
-"""Usual standard deviation in the first iteration, wide enough that no lamp pulls the solution before it is
-recognised."""
+GREEN = 1
+_LANES = 4
+_NUISANCES, _WIDE, _FREQUENCY = 5, 8, 8
+_native = library(__file__, "channel_fit")
+_native.fit_channel.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+_PLANES = ctypes.c_int64.in_dll(_native, "channel_planes").value
+
+
+class _ChannelFit(Workspace):
+    """As in channel_fit.h."""
+
+    _fields_ = (
+        ("m", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("channel", "frequencies", "field", "width", "wide")),
+        *((name, ctypes.c_void_p) for name in ("first", "spread", "colorful", "mean_model", "basis", "rows", "lower")),
+        *((name, ctypes.c_double) for name in ("white_per_irradiance", "lamp_freedom", "weight_freedom", "weakest")),
+        *((name, ctypes.c_void_p) for name in ("nuisances", "scales", "spreads", "lamps", "weights")),
+        *((name, ctypes.c_void_p) for name in ("nuisance", "scale", "lamp", "weight", "packed", "covariance")),
+        *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "field_rows", "shared", "stacked")),
+        *((name, ctypes.c_void_p) for name in ("frequency", "expected", "certain", "solution", "carried")),
+        *((name, ctypes.c_void_p) for name in ("carried_light", "fields", "certainty", "products", "small")),
+        *((name, ctypes.c_double) for name in ("chi2", "unexplained")),
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelFit:
-    """Solution for one channel."""
+class FitResult:
+    """How well one channel was fitted."""
 
-    packed: Array
-    """(2k - 1,) real-packed coefficients [radiance * sr]."""
-    covariance: Array
-    """Their covariance."""
-    field: Array
-    """(blocks,) smooth reflection field [full scale]."""
-    reflection: Array
-    """(blocks,) field plus what each block mirrors beside it, such as a lamp."""
-    predicted: Array
-    """(blocks, 7) rows that lighting and reflection predict, blur included."""
     chi2: float
     """Robust chi-square per row; nan when no row was usable."""
     unexplained: float
-    """Share of the stripes that the fit does not explain, 0 to about 1; nan where too few blocks show clear stripes."""
-    nuisance: Nuisance
-    """Blur and lower face at which the stripes fit best."""
+    """Share of the stripes that the fit does not explain, 0 to about 1; nan where too few blocks show clear stripes,
+    and for red and blue."""
 
 
-def fit_channel(
-    means: BlockMeans,
-    channel: int,
-    white: float,
-    rows: Array,
-    lower: Array,
-    mean_model: Array,
-    system: BlockSystem,
-    nuisance: Nuisance,
-) -> ChannelFit:
-    """Fit one channel.
+class SheetFit:
+    """Fits the channels of one frame after the other; owns the room that the compiled fit works in.
 
-    Args:
-        means: the frame's measurements.
-        channel: 0, 1, 2 for red, green, blue.
-        white: radiance of clear film on white paper.
-        rows: (blocks, 7, 3) response before blur; lower: (blocks, 7) what the lower face mirrors where the upper
-            face mirrors 1.
-        mean_model: (blocks,) error of the model in the means, relative to white.
-        system: gathers and solves the normal equations.
-        nuisance: first guess.
+    Planes are in the order of the response's sequence and filled up to whole lanes.
     """
-    task = _Task.of(means, channel, white, rows, lower, mean_model, system, nuisance)
-    lamp = np.maximum(task.ordinary, (_FIRST_SPARKLE * white) ** 2)
-    weights = np.ones(len(rows))
-    for _ in range(_ITERATIONS):
-        done = task.iterate(nuisance, lamp, weights)
-        nuisance, lamp, weights = done.nuisance, done.lamp, done.weights
-    predicted = task.values - done.residual
-    unexplained = unexplained_share(means, channel, white, predicted, done.model.transfer)
-    return task.finished(done, predicted, unexplained)
 
-
-@dataclass(frozen=True, slots=True)
-class _Iteration:
-    """One solution, and what the next one starts from."""
-
-    model: "_Model"
-    """The rows' model that was solved for."""
-    precision: Array
-    """(blocks, 7, 7) of the rows beside lamps."""
-    solution: Array
-    """Coefficients and reflection field."""
-    normal: Array
-    """Their normal matrix."""
-    field: Array
-    """(blocks,) smooth reflection field."""
-    extra: Array
-    """(blocks,) what each block mirrors beside it."""
-    missed: Array
-    """(blocks, 7) measured less lighting and field."""
-    residual: Array
-    """(blocks, 7) the same less the extras."""
-    squared: Array
-    """(blocks, 7) residuals, squared, relative to their variances."""
-    beside: Beside
-    """Equations of the nuisance."""
-    nuisance: Nuisance
-    """Blur, shift and lower face for the next iteration."""
-    doubt: Array
-    """(5, 5) their covariance."""
-    lamp: Array
-    """(blocks,) variance to grant the extras in the next iteration."""
+    packed: Array
+    """(3, 2k - 1) real-packed coefficients of each channel [radiance * sr]."""
+    covariance: Array
+    """(3, 2k - 1, 2k - 1) their covariance."""
+    nuisances: Array
+    """(3, 5) blur [px^2], sharpness [px^4], lower face, shift x and y [px] at which each channel's stripes fit best."""
+    scales: Array
+    """(3, 2) variance of the model's errors in means and harmonics, relative to the usual."""
+    spreads: Array
+    """(3,) of red's and blue's (places 0 and 2) coefficients about green's."""
+    lamps: Array
+    """(3, stride) variance granted to what each block mirrors by itself [full scale squared]."""
     weights: Array
-    """(blocks,) weights of the blocks in the next iteration."""
+    """(3, stride) weight of each block."""
+    reflection: Array
+    """(3, stride) field plus what each block mirrors beside it, such as a lamp [full scale]."""
+    predicted: Array
+    """(3, 7, stride) rows that light and reflection predict, blur included [full scale]."""
 
+    def __init__(
+        self,
+        blocks: MeasuredBlocks,
+        response: BlockResponse,
+        frequencies: NDArray[np.int64],
+        basis: Array,
+        mean_model: Array,
+        white_per_irradiance: float,
+    ) -> None:
+        """Make room.
 
-@dataclass(frozen=True, slots=True)
-class _Task:
-    """What stays the same while weights, blur and solution are refined."""
-
-    means: BlockMeans
-    """The frame's measurements."""
-    channel: int
-    """0, 1, 2 for red, green, blue."""
-    rows: Array
-    """(blocks, 7, 3) response before blur."""
-    lower: Array
-    """(blocks, 7) what the lower face mirrors where the upper face mirrors 1."""
-    system: BlockSystem
-    """Gathers and solves the normal equations."""
-    noise: RowNoise
-    """Errors to expect of the rows."""
-    known_scale: tuple[float, float]
-    """Variance of the model's errors in means and harmonics, relative to the usual, as earlier frames have it."""
-    sparkle: float
-    """Usual variance of what a block mirrors beside the smooth field."""
-    ordinary: Array
-    """(blocks,) the same with what the block's shading tells of it."""
-
-    @classmethod
-    def of(
-        cls, means: BlockMeans, channel: int, white: float, rows: Array, lower: Array, mean_model: Array,
-        system: BlockSystem, nuisance: Nuisance,
-    ) -> "_Task":  # fmt: skip
-        """Arguments as of `fit_channel`."""
-        noise = row_noise(means, channel, white, mean_model, nuisance.transfer(means.cycles_per_px))
-        known_scale = nuisance.error_scale[channel]
-        uneven = np.maximum(means.shading[:, channel] - _EVEN * white, 0.0)
-        sparkle = (_SPARKLE * white) ** 2
-        ordinary = known_scale[0] * sparkle + (_EXTRA_TO_SHADING * uneven) ** 2
-        return cls(means, channel, rows, lower, system, noise, known_scale, sparkle, ordinary)
-
-    @property
-    def values(self) -> Array:
-        """(blocks, 7) what was measured."""
-        return self.means.values[:, :, self.channel]
-
-    def iterate(self, nuisance: Nuisance, lamp: Array, weights: Array) -> _Iteration:
-        """Solve once, and refine what the solution was made with."""
-        model = _Model.of(nuisance, self.means, self.rows, self.lower)
-        scale = row_scale(self.known_scale)
-        precision = self.noise.precision(scale, model.usable) * weights[:, None, None]
-        lamps = BesideLamps.of(precision, model.mirror, lamp)
-        solution, normal = self.system.solve(model.design, model.mirror, self.values, lamps.precision)
-        field = self.system.field(solution)
-        missed = self.values - self.system.lit(solution, model.design) - model.mirror * field[:, None]
-        extra = lamps.extra(missed)
-        residual = missed - model.mirror * extra[:, None]
-        squared = residual**2 / self.noise.residual_variance(scale)
-        # only what stands out of the noise can tell how the lower face mirrors it
-        mirrored = field + extra**3 / np.maximum(extra**2 + lamps.spread, 1e-30)
-        cycles = self.means.cycles_per_px
-        slopes = nuisance.slopes(self.values - residual, model.face * mirrored[:, None], cycles)
-        beside = self.system.beside(normal, model.design, model.mirror, lamps.precision, slopes, missed)
-        stepped, doubt = nuisance.stepped(beside.information, beside.right)
-        return _Iteration(
-            model, lamps.precision, solution, normal, field, extra, missed, residual, squared, beside, stepped, doubt,
-            lamps.granted(extra, self.ordinary), block_weights(squared, model.usable),
+        Args:
+            blocks: the frame's measurements.
+            response: of the sheet, filled for the frame's view before a fit.
+            frequencies: (k, 2) of the coefficients, (0, 0) first.
+            basis: (blocks, s) of the reflection field.
+            mean_model: (blocks,) standard deviation of the model's error in the means, relative to white.
+            white_per_irradiance: radiance of white for L~_0 = 1.
+        """
+        stride, modes = len(response.cosine), basis.shape[1]
+        sequence, field = response.sequence, modes + 1
+        width = _whole(field + 2)
+        self._first = np.searchsorted(response.places[sequence, 1], [0, *range(1, 2 * len(frequencies), 2)])
+        self._frequencies = frequencies
+        rows = np.zeros((stride, width))
+        rows[: len(sequence), :modes] = basis[sequence]
+        model = np.zeros(stride)
+        model[: len(sequence)] = mean_model[sequence]
+        self.nuisances, self.scales = np.zeros((CHANNELS, _NUISANCES)), np.ones((CHANNELS, 2))
+        self.spreads = np.zeros(CHANNELS)
+        self.lamps, self.weights = np.zeros((CHANNELS, stride)), np.ones((CHANNELS, stride))
+        self.reflection, self.predicted = np.zeros((CHANNELS, stride)), np.zeros((CHANNELS, ROWS, stride))
+        self._blocks = blocks
+        self.native = _ChannelFit(
+            m=ctypes.addressof(blocks.native), field=field, width=width, white_per_irradiance=white_per_irradiance,
+            lamp_freedom=lamps.FREEDOM, weight_freedom=robust_weights.FREEDOM, weakest=stripe_rows.WEAKEST_TRANSFER,
         )  # fmt: skip
+        self.native.hold({
+            "first": self._first.astype(np.int32), "spread": prior_stddev(frequencies, 1.0),
+            "colorful": color_stddev(frequencies, 1.0, 1.0), "mean_model": model, "basis": rows,
+            "rows": response.rows, "lower": response.mirror, "nuisances": self.nuisances, "scales": self.scales,
+            "spreads": self.spreads, "lamps": self.lamps, "weights": self.weights, "reflection": self.reflection,
+            "predicted": self.predicted,
+        })  # fmt: skip
+        self._pointer = ctypes.byref(self.native)
+        self._make_room(stride, width)
 
-    def finished(self, done: _Iteration, predicted: Array, unexplained: float) -> ChannelFit:
-        """The last solution, with how certain it is."""
-        inverse = np.asarray(np.linalg.inv(done.normal), float)
-        packed = done.solution[: len(done.solution) - self.system.field_size]
-        squared, usable = done.weights[:, None] * done.squared, done.model.usable
-        return ChannelFit(
-            packed=packed,
-            covariance=_covariance(packed, inverse + done.beside.carried @ done.doubt @ done.beside.carried.T),
-            field=done.field,
-            reflection=done.field + done.extra,
-            predicted=predicted,
-            chi2=float(np.mean(squared[usable])) if np.any(usable) else float("nan"),
-            unexplained=unexplained,
-            nuisance=done.nuisance.rescaled(self.channel, self._scales(done, inverse)),
-        )
+    def _make_room(self, stride: int, width: int) -> None:
+        unknown = 2 * len(self._frequencies) - 1
+        wide, most = _whole(unknown), int(np.diff(self._first).max(initial=1))
+        shapes = {
+            "planes": (_PLANES, stride), "field_rows": (stride, width), "shared": (width, width),
+            "stacked": (stride + 8, width), "frequency": (len(self._frequencies) + 1, _FREQUENCY),
+            "expected": (wide,), "certain": (wide,), "solution": (width,), "carried": (width, _WIDE),
+            "carried_light": (wide + 1, _WIDE), "fields": (width, stride), "certainty": (width + 8, wide),
+            "products": (wide, wide), "small": (most + 8, most + 8),
+        }  # fmt: skip
+        self.native.hold({name: np.zeros(shape) for name, shape in shapes.items()})
 
-    def _scales(self, done: _Iteration, inverse: Array) -> tuple[float, float]:
-        """Variance of the model's errors in means and harmonics for the next frame, by this one's residuals."""
-        model = done.model
-        left = done.precision - self.system.explained(inverse, model.design, model.mirror, done.precision)
-        pull = np.einsum("brs,bs->br", done.precision, done.missed)
-        mean, swing = next_scales(self.known_scale, self.noise, self.sparkle, self.ordinary, model.usable, pull, left)
-        return (mean, swing) if self.noise.whole else (max(mean, 1.0), max(swing, 1.0))
+    def begin(self, count: int, nuisance: Nuisance) -> int:
+        """Prepare for a frame with the first `count` frequencies; returns how many blocks they have."""
+        unknown = 2 * count - 1
+        self.packed, self.covariance = np.empty((CHANNELS, unknown)), np.empty((CHANNELS, unknown, unknown))
+        native = self.native
+        native.frequencies, native.wide = count - 1, _whole(unknown)
+        native.packed, native.covariance = self.packed.ctypes.data, self.covariance.ctypes.data
+        self.nuisances[GREEN] = nuisance.values
+        self.scales[:] = nuisance.error_scale
+        self.spreads[0], self.spreads[2] = nuisance.color_spread
+        return int(self._first[count])
 
+    def forget(self) -> None:
+        """Know nothing of green's lamps and weights, as in a first frame."""
+        _native.forget(self._pointer)
 
-@dataclass(frozen=True, slots=True)
-class _Model:
-    """The rows' model at one blur and shift."""
+    def fit(self, channel: int, passes: int = 1, *, settle: bool = False) -> FitResult:
+        """Fit one channel; green starts from the lamps, weights and nuisance at hand, red and blue from green's.
 
-    transfer: Array
-    """(blocks, 7) what blur leaves."""
-    design: Array
-    """(blocks, 7, c) response to the coefficients."""
-    face: Array
-    """(blocks, 7) what the lower face mirrors if it is as strong as Fresnel's."""
-    mirror: Array
-    """(blocks, 7) what both faces mirror."""
-    usable: NDArray[np.bool_]
-    """(blocks, 7) rows that were measured and that blur has left."""
-
-    @classmethod
-    def of(cls, nuisance: Nuisance, means: BlockMeans, rows: Array, lower: Array) -> "_Model":
-        transfer = nuisance.transfer(means.cycles_per_px)
-        face = nuisance.shifted(lower * transfer, means.cycles_per_px)
-        mirror = nuisance.lower_face * face
-        mirror[:, 0] += 1.0
-        design = nuisance.shifted(rows * transfer[..., None], means.cycles_per_px)
-        return cls(transfer, design, face, mirror, usable_rows(means, transfer))
+        Args:
+            channel: 0, 1, 2 for red, green, blue; green comes first.
+            passes: how often lamps, weights and solution are refined.
+            settle: look for the nuisance in each of them, not just in the last.
+        """
+        _native.fit_channel(self._pointer, channel, passes, settle)
+        return FitResult(self.native.chi2, self.native.unexplained)
 
 
-def _covariance(packed: Array, of_all: Array) -> Array:
-    """Covariance of the coefficients, out of that of all unknowns: what scales the whole measurement is added."""
-    size = len(packed)
-    return np.asarray(of_all[:size, :size] + _GAIN_DOUBT**2 * np.outer(packed, packed), float)
+def _whole(count: int) -> int:
+    """Rounded up to whole lanes."""
+    return -(-count // _LANES) * _LANES

@@ -107,13 +107,16 @@ class FixedEstimator:
         self._calibration = calibration
         self._reference = ReferenceRegions(probe)
 
-    def estimate(self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None) -> Estimate:
+    def estimate(
+        self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None, order: int | None = None
+    ) -> Estimate:
         """Lighting of one frame.
 
         Args:
             means: the frame's measurements; only the means are used.
             time_s: the frame's time [s].
             nuisance: passed on as it is; one matrix knows no blur.
+            order: highest order that is told; the sheet's by default.
         """
         calibration = self._calibration
         packed = calibration.apply(self._reference.without_reflection(means), means.valid)
@@ -125,6 +128,8 @@ class FixedEstimator:
             time_s,
             float("nan"),
         )
+        if order is not None:
+            lighting = lighting.truncated(order)
         reflection = self._reference.reflection(means)
         return Estimate(lighting, means.values.copy(), reflection, nuisance or Nuisance(), float("nan"))
 

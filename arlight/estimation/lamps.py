@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_FREEDOM = 4.0
+FREEDOM = 4.0
 """Degrees of freedom of the Student-t distribution of the extras."""
 
 
@@ -51,7 +51,7 @@ class BesideLamps:
             extra: (blocks,) as found.
             ordinary: (blocks,) variance of the extras of blocks that mirror no lamp.
         """
-        return (_FREEDOM * ordinary + extra**2 + self.spread) / (_FREEDOM + 1.0)
+        return (FREEDOM * ordinary + extra**2 + self.spread) / (FREEDOM + 1.0)
 
 
 def _diagonal(precision: Array) -> Array:

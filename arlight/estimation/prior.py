@@ -1,17 +1,24 @@
 """What is known about natural light before anything is measured."""
 
+import ctypes
+
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.fourier import frequency_order
+from arlight.native import address, library
 
 _RELATIVE_SPREAD = 0.35
 """Standard deviation of Re and Im of L~_n relative to L~_0 at order 1, over twelve captured environments."""
 COLOR_SPREAD = 0.08
 """The same of the difference between red or blue and green, each relative to its own L~_0."""
-_LEAST_COLOR_SPREAD = 0.004
 _MEAN_SPREAD = 10.0
 """Standard deviation of L~_0: three times a hemisphere of full-scale radiance [radiance * sr]."""
+_native = library(__file__, "channel_fit")
+_native.color_spread.restype = ctypes.c_double
+_native.color_spread.argtypes = (
+    ctypes.c_int64, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double,
+)  # fmt: skip
 
 
 def prior_stddev(frequencies: NDArray[np.int64], irradiance: float) -> NDArray[np.float64]:
@@ -53,10 +60,10 @@ def color_spread(
         variance: (2k - 1,) of that estimate.
         last: the spread that the estimate was made with.
     """
-    unit = color_stddev(frequencies, irradiance, 1.0)[1:]
-    determined = np.sum(np.clip(1.0 - variance[1:] / (last * unit) ** 2, 0.02, 1.0))
-    spread = float(np.sqrt(np.sum((difference[1:] / unit) ** 2) / determined))
-    return float(np.clip(np.sqrt(spread * last), _LEAST_COLOR_SPREAD, 3.0 * COLOR_SPREAD))
+    unit = color_stddev(frequencies, 1.0, 1.0)
+    arrays = [np.array(values, np.float64) for values in (unit, difference, variance)]
+    colorful, differences, variances = (address(array, np.float64) for array in arrays)
+    return float(_native.color_spread(len(unit), colorful, irradiance, differences, variances, last))
 
 
 def _falling(frequencies: NDArray[np.int64], first_order: float) -> NDArray[np.float64]:

@@ -4,16 +4,21 @@ The film mirrors the environment, and neighbouring blocks mirror neighbouring di
 Matern-3/2 process over the sheet, written in its leading eigenvectors: a few dozen numbers of known variance a channel.
 """
 
+import ctypes
+
 import numpy as np
 from numpy.typing import NDArray
+
+from arlight.native import address, library
 
 Array = NDArray[np.float64]
 
 _LENGTH_MM = 40.0
 """Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
 _KEPT_VARIANCE = 3e-3
-_PATCH = 15.0
-"""How bright a mirrored patch may be, relative to the field's usual deviation, before it is a lamp's."""
+_native = library(__file__, "measured_blocks")
+_native.amplitude_of_field.restype = ctypes.c_double
+_native.amplitude_of_field.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_double)
 
 
 def reflection_basis(centers_mm: Array) -> Array:
@@ -34,9 +39,10 @@ def field_amplitude(observed: Array, floor: float) -> float:
 
     A bright patch is mirrored in few of them; a deviation that ignored it would let the patch pass for light. A lamp
     counts as such a patch and no more.
+
+    Args:
+        observed: (n,) means of black regions.
+        floor: least standard deviation.
     """
-    if len(observed) < 3:
-        return 10.0 * floor
-    away = observed - np.median(observed)
-    usual = max(1.5 * float(np.median(np.abs(away))), floor)
-    return max(float(np.std(np.clip(away, -_PATCH * usual, _PATCH * usual))), usual)
+    values = np.array(observed, np.float64)
+    return float(_native.amplitude_of_field(address(values, np.float64), len(values), floor))

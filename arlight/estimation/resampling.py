@@ -27,9 +27,10 @@ class Resampling:
     """(m, m) covariance of what no measured coefficient tells, for L~_0 = 1."""
 
     def apply(self, packed: Array, covariance: Array) -> tuple[Array, Array]:
-        """Coefficients (m,) at whole frequencies with their covariance (m, m)."""
-        values = self.matrix @ packed
-        return values, self.matrix @ covariance @ self.matrix.T + self.missing * values[0] ** 2
+        """Coefficients (..., m) at whole frequencies with their covariance (..., m, m)."""
+        values = packed @ self.matrix.T
+        spread = self.matrix @ covariance @ self.matrix.T
+        return values, spread + self.missing * values[..., :1, None] ** 2
 
 
 def measured_frequencies(probe: Probe, assembly: Assembly) -> Array:
@@ -38,15 +39,13 @@ def measured_frequencies(probe: Probe, assembly: Assembly) -> Array:
     return np.asarray(cycles * assembly.slab(probe).period_mm, float)
 
 
-def resampling(probe: Probe, assembly: Assembly) -> Resampling | None:
-    """Build the prediction for a sheet; None when its stripes have whole frequencies."""
-    measured = measured_frequencies(probe, assembly)
-    if np.allclose(measured, probe.frequencies, atol=1e-9):
+def resampling(probe: Probe, assembly: Assembly, count: int | None = None) -> Resampling | None:
+    """Build the prediction for a sheet, or for its first `count` frequencies; None when its stripes have whole ones."""
+    measured, whole = measured_frequencies(probe, assembly)[:count], probe.frequencies[:count]
+    if np.allclose(measured, whole, atol=1e-9):
         return None
     slab = assembly.slab(probe)
-    seen, wanted = (
-        received_operator(slab, frequencies, *sky_directions()) for frequencies in (measured, probe.frequencies)
-    )
+    seen, wanted = (received_operator(slab, frequencies, *sky_directions()) for frequencies in (measured, whole))
     matrix = wanted @ predicted_sky(slab, measured)
     told = sky_covariance() @ wanted.T
     missing = (wanted @ told - matrix @ (seen @ told)) / (wanted[0] @ told[:, 0])

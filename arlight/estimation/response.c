@@ -2,6 +2,7 @@
 
 A real function has harmonics 0 to 4 as a mean and four complex numbers; those of -l are the conjugates. */
 #include "lanes.h"
+#include "reflection.h"
 
 #define TOP 4                     /* highest harmonic of a layer that is followed */
 #define PARTS (2 * TOP + 1)       /* real numbers of a series: mean, then real and imaginary parts */
@@ -112,14 +113,6 @@ INLINE void write_product(const Series *f, const Series *q, lanes factor, double
     }
 }
 
-/* Reflectance of one face of the glass (Fresnel, unpolarised). */
-INLINE lanes face_reflectance(lanes cosine, double index)
-{
-    lanes air = larger(smaller(cosine, splat(1.0)), splat(0.0));
-    lanes glass = root(1.0 - (1.0 - air * air) / (index * index));
-    lanes s = (air - index * glass) / (air + index * glass), p = (index * air - glass) / (index * air + glass);
-    return 0.5 * (s * s + p * p);
-}
 
 /* Radiosity for L_0 = 1, with what the rest of the light's shape adds to it. */
 INLINE Series lit(const Response *r, int64_t block)

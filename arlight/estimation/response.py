@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from arlight.estimation.layer_series import HARMONICS as STACK_HARMONICS
 from arlight.estimation.layer_series import real_parts
+from arlight.estimation.radiance_prior import predicted_sky, received_operator, sky_directions
 from arlight.estimation.resampling import measured_frequencies
 from arlight.estimation.slab_echo import uniform_light
 from arlight.estimation.stack import PaperLight, paper_light
@@ -24,8 +25,8 @@ from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_LANES = 4
-"""Blocks that the compiled code handles together."""
+_LANES = 8
+"""Planes are filled up to a multiple of this: the compiled code handles four or eight blocks together."""
 _PARTS = 2 * STACK_HARMONICS + 1
 _native = library(__file__, "response")
 
@@ -71,13 +72,15 @@ class BlockResponse:
         """
         blocks = field_blocks(probe)
         light = paper_light(probe, blocks, assembly, bounces=bounces, echoes=echoes)
-        slab = (assembly or Assembly()).slab(probe)
+        slab = self._slab = (assembly or Assembly()).slab(probe)
+        self._measured = measured_frequencies(probe, assembly or Assembly())
+        self._beyond: dict[int, Array] = {}
         self.places, known = _places(probe, blocks, light.radiosity.shape[2])
         self.sequence = np.argsort(self.places[:, 1], kind="stable")
         self._count, unknown = len(blocks), 2 * len(probe.frequencies) - 1
         self._shape = np.zeros(unknown)
         if light.echo is not None:
-            self._usual_shape = uniform_light(slab, measured_frequencies(probe, assembly or Assembly()))
+            self._usual_shape = uniform_light(slab, self._measured)
         else:
             self._usual_shape = np.eye(1, unknown)[0]
         stride = -(-len(blocks) // _LANES) * _LANES
@@ -147,14 +150,24 @@ class BlockResponse:
         """Compute `rows` and `mirror` for the first `count` blocks of the sequence, seen as `phasor` and `cosine` say.
 
         Args:
-            shape: as for `light`.
+            shape: as for `light`, or of the first coefficients alone.
             folded: count light of twice a block's frequency with that of L_0, by the shape; of `rows` only the first
                 three columns are filled then.
         """
-        self._shape[:] = self._usual_shape if shape is None else shape
+        self._shape[:] = self._usual_shape if shape is None else self._completed(shape)
         self._native.blocks, self._native.folded = count, folded
         _native.light_rows(ctypes.byref(self._native))
         _native.mirror_rows(ctypes.byref(self._native))
+
+    def _completed(self, shape: Array) -> Array:
+        """Coefficients that were not measured, by the sky that the measured ones predict."""
+        known = len(shape)
+        if known == len(self._shape):
+            return shape
+        if known not in self._beyond:
+            operator = received_operator(self._slab, self._measured, *sky_directions())
+            self._beyond[known] = operator[known:] @ predicted_sky(self._slab, self._measured[: (known + 1) // 2])
+        return np.concatenate([shape, self._beyond[known] @ shape])
 
     def _look(self, means: BlockMeans) -> None:
         phasor = np.asarray(means.view_phasor)[self.sequence]

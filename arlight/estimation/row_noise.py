@@ -4,6 +4,7 @@ Noise differs from pixel to pixel and is told by the pixels. What model and code
 pixels, in blocks of one frequency, and in neighbouring frames; how much it is, the rows' residuals tell.
 """
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +24,6 @@ _QUIET, _NOISY = 0.1, 3.0
 """The same in a noisy picture: this quantile of the blocks' pixel variance, times this."""
 _LAMP_PIXELS = 60.0
 """How many pixels the image of a lamp moves together."""
-ALIKE = np.repeat((5.0, 14.0), (1, ROWS - 1))
-"""Variance of the model's errors in mean and harmonics, relative to the part of it that leaves a residual."""
 MEAN_MODEL = 0.0012
 """Standard deviation of the model's error in a patterned or black block's mean, relative to white."""
 WHITE_MODEL = 0.01
@@ -47,6 +46,26 @@ _CHROMA_SWING = 0.001
 """The same of a harmonic."""
 
 
+class UsualErrors(ctypes.Structure):
+    """The constants above for the compiled fit, as in row_noise.h."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_double)
+        for name in (
+            "floor", "stray", "quiet", "noisy", "lamp_pixels", "swing_model", "codec", "transfer", "faintest",
+            "color_spread", "least_trust", "chroma_mean", "chroma_swing",
+        )
+    )  # fmt: skip
+
+    @classmethod
+    def of_rows(cls) -> "UsualErrors":
+        """Filled in."""
+        return cls(
+            _FLOOR, _STRAY, _QUIET, _NOISY, _LAMP_PIXELS, _SWING_MODEL, _CODEC, _TRANSFER, np.log(_FAINTEST),
+            _COLOR_SPREAD, _LEAST_TRUST, _CHROMA_MEAN, _CHROMA_SWING,
+        )  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True)
 class RowNoise:
     """Expected errors of one channel's rows."""
@@ -60,26 +79,9 @@ class RowNoise:
     trust: Array
     """(blocks, 7) share of a row that was seen; the rest repeats the last estimate."""
 
-    whole: bool
-    """Whether the channel was stored with every pixel. What coarse quantisation leaves out of subsampled chroma it
-    leaves out of all blocks, so that no residual shows it."""
-
     def variance(self, scale: Array) -> Array:
         """(blocks, 7) variance of the rows where the model's errors are scaled by (7,)."""
         return (np.diagonal(self.pixels, axis1=1, axis2=2) + scale * self.model + self.inferred) / self.trust**2
-
-    def residual_variance(self, scale: Array) -> Array:
-        """The same of what leaves a residual: errors that all blocks of a frequency share look like light."""
-        return self.variance(scale / ALIKE)
-
-    def precision(self, scale: Array, usable: NDArray[np.bool_]) -> Array:
-        """(blocks, 7, 7) inverse covariance of the usable rows; 0 elsewhere."""
-        both = usable[:, :, None] & usable[:, None, :]
-        covariance = np.where(both, self.pixels, 0.0)
-        row = np.arange(usable.shape[1])
-        covariance[:, row, row] += np.where(usable, scale * self.model + self.inferred, 1.0)
-        inverse = np.linalg.inv(covariance) * both
-        return np.asarray(inverse * self.trust[:, :, None] * self.trust[:, None, :], float)
 
 
 def row_noise(means: BlockMeans, channel: int, white: float, mean_model: Array, transfer: Array) -> RowNoise:
@@ -110,7 +112,7 @@ def row_noise(means: BlockMeans, channel: int, white: float, mean_model: Array, 
         unseen = _COLOR_SPREAD * (1.0 - means.color_trust)
         inferred[:, 1:] = (unseen[:, None] * swing) ** 2
         trust[:, 1:] = np.maximum(means.color_trust, _LEAST_TRUST)[:, None]
-    return RowNoise(pixels, model, inferred, trust, channel == 1 or bool(np.all(means.color_trust >= 1.0)))
+    return RowNoise(pixels, model, inferred, trust)
 
 
 def row_variance(means: BlockMeans, channel: int, white: float, mean_model: Array) -> Array:

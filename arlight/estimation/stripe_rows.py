@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 HARMONIC_OF_ROW = np.concatenate([[0], np.repeat(np.arange(1, HARMONICS + 1), 2)])
 """(7,) which harmonic each row tells of; 0 for the mean."""
-_WEAKEST_TRANSFER = 0.12
+WEAKEST_TRANSFER = 0.12
 """Harmonics that blur has taken below this share are not used."""
 
 
@@ -28,7 +28,7 @@ def usable_rows(means: BlockMeans, transfer: Array) -> NDArray[np.bool_]:
     Args:
         transfer: (blocks, 7) what blur leaves.
     """
-    usable = (means.harmonics[:, None] >= HARMONIC_OF_ROW) & (transfer > _WEAKEST_TRANSFER)
+    usable = (means.harmonics[:, None] >= HARMONIC_OF_ROW) & (transfer > WEAKEST_TRANSFER)
     # a mean is there whatever the stripes are
     usable[:, 0] = True
     return usable & means.valid[:, None]

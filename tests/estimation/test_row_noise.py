@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from arlight.estimation.row_noise import ALIKE, row_noise, row_variance
+from arlight.estimation.row_noise import row_noise, row_variance
 
 WHITE, GREEN = 0.5, 1
 
@@ -95,32 +95,6 @@ def test_inferred_chroma_widens_red_and_blue_and_not_green(blank):
         # a mean is always seen, only more coarsely
         assert np.all(inferred[:, 0] >= seen[:, 0])
         assert np.all(inferred[:, 0] == partly[:, 0])
-
-
-def test_rows_that_err_together_keep_their_correlation(blank):
-    means = blank(sigma=0.01)
-    generator = np.random.default_rng(4)
-    factors = generator.normal(size=(len(means.valid), 7, 30))
-    means = replace(means, covariance=factors @ factors.swapaxes(1, 2) / 30 / 400)
-    noise = row_noise(means, GREEN, WHITE, np.full(len(means.valid), 0.001), np.ones(means.values.shape[:2]))
-    usable = np.ones(means.values.shape[:2], bool)
-    usable[::3, 5:] = False
-    scale = np.full(7, 0.7)
-    precision = noise.precision(scale, usable)
-    for block in range(len(usable)):
-        kept = np.flatnonzero(usable[block])
-        covariance = noise.pixels[block] + np.diag(scale * noise.model[block])
-        expected = np.zeros((7, 7))
-        expected[np.ix_(kept, kept)] = np.linalg.inv(covariance[np.ix_(kept, kept)])
-        np.testing.assert_allclose(precision[block], expected, rtol=1e-8, atol=1e-6 * expected.max())
-
-
-def test_only_the_models_errors_hide_from_the_residuals(blank):
-    means = blank(sigma=0.01)
-    noise = row_noise(means, GREEN, WHITE, np.full(len(means.valid), 0.001), np.ones(means.values.shape[:2]))
-    np.testing.assert_allclose(noise.residual_variance(np.zeros(7)), noise.variance(np.zeros(7)))
-    hidden = noise.variance(np.ones(7)) - noise.residual_variance(np.ones(7))
-    np.testing.assert_allclose(hidden, (1.0 - 1.0 / ALIKE) * noise.model, rtol=1e-6, atol=1e-15)
 
 
 def test_doubt_of_the_blur_grows_with_what_it_takes(blank):
