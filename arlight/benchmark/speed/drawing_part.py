@@ -81,7 +81,7 @@ def _measure_frame(
     if pose is None or light is None:
         return
     drawn = costs.time("render", lambda: relighter.draw_object(pose, light))
-    together = costs.time("render and composite", lambda: relighter.render(frame, pose, light))
+    together = costs.time("relight", lambda: relighter.render(frame, pose, light))
     costs.seconds.setdefault("composite", []).append(max(together - drawn, 0.0))
     costs.time(CONVERSION, lambda: convert_whole_frame(frame))
     for name, drawing in whole.items():
@@ -92,12 +92,12 @@ def _measure_frame(
 def _tell(found: Findings, workload: str, seconds: dict[str, list[float]]) -> None:
     # the first frame makes buffers
     costs = {name: values[1:] for name, values in seconds.items()}
-    for stage, yardstick in (("render", OPENGL), ("composite", CONVERSION), ("render and composite", OPENGL)):
+    for stage, yardstick in (("render", OPENGL), ("composite", CONVERSION), ("relight", OPENGL)):
         ratios = paired_ratio(costs[stage], costs[yardstick])
         found.ratios[f"{stage}, {workload}"] = Ratio(ratios, yardstick, 1e3 * spread(costs[stage]).median)
     if PYRENDER in costs:
-        own = seconds["render and composite"][::_PYRENDER_EVERY][1:]
-        found.ratios[f"render and composite over pyrender, {workload}"] = Ratio(
+        own = seconds["relight"][::_PYRENDER_EVERY][1:]
+        found.ratios[f"relight over pyrender, {workload}"] = Ratio(
             paired_ratio(own, costs[PYRENDER]), PYRENDER, 1e3 * spread(own).median
         )
     found.details["drawing"] = [

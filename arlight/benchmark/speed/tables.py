@@ -97,18 +97,16 @@ def _stage_table(found: Findings) -> Table:
 
 def _preset_table(found: Findings) -> Table:
     presets = [point for point in found.details["front"] if point["is_preset"]]
-    stages, orders = list(presets[0]["stages_ms"]), range(len(presets[0]["error_by_order"]))
-    table = Table(title="presets: CPU ms by stage; error by order, % of |L_0|")
-    for name in ("preset", "estimate over ArUco", *stages, *(f"order {order}" for order in orders), "relit picture %"):
-        table.add_column(name, justify="left" if name == "preset" else "right")
+    table = Table(title="presets")
+    table.add_column("")
     for point in presets:
-        table.add_row(
-            point["name"],
-            f"{point['estimate_over_aruco']['median']:.3f}",
-            *(f"{point['stages_ms'][stage]:.2f}" for stage in stages),
-            *(_percent(error) for error in point["error_by_order"]),
-            _percent(point["relighting_error"]),
-        )
+        table.add_column(point["name"], justify="right")
+    table.add_row("track to filter over ArUco", *(f"{p['estimate_over_aruco']['median']:.3f}" for p in presets))
+    for stage in presets[0]["stages_ms"]:
+        table.add_row(f"{stage}, CPU ms", *(f"{p['stages_ms'][stage]:.2f}" for p in presets))
+    for order, _ in enumerate(presets[0]["error_by_order"]):
+        table.add_row(f"error of order {order}, % of |L_0|", *(_percent(p["error_by_order"][order]) for p in presets))
+    table.add_row("error of the relit picture, %", *(_percent(p["relighting_error"]) for p in presets))
     return table
 
 

@@ -39,7 +39,7 @@ def test_reading_and_writing_are_counted_by_the_frame(clip, tmp_path):
 def test_drawing_and_compositing_have_yardsticks_of_their_own(clip, relighter):
     found = measure_drawing(clip, 5, relighter)
     yardsticks = {name.split(",")[0]: ratio.over for name, ratio in found.ratios.items()}
-    assert yardsticks["render"] == yardsticks["render and composite"] == OPENGL
+    assert yardsticks["render"] == yardsticks["relight"] == OPENGL
     assert yardsticks["composite"] == CONVERSION
     (row,) = found.details["drawing"]
     assert row["cpu_ms"]["render"]["count"] == 4
