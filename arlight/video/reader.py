@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -46,7 +47,10 @@ class VideoReader:
         self._container = _open(self.path)
         try:
             self._stream = _picture_stream(self._container)
-            first = self._first_picture()
+            # the first pass goes on from here: to open a file takes as long as some frames
+            self._begun: Iterator[av.VideoFrame] | None = self._pictures(self._container, self._stream)
+            first = self._first_picture(self._begun)
+            self._begun = chain([first], self._begun)
             self.tags: ColourTags = colour_tags(first)
             """The stream's colour tags, as they stand in it."""
             self._location = chroma_location(first)
@@ -92,12 +96,13 @@ class VideoReader:
         return [stream.codec_context.codec.canonical_name for stream in self._container.streams.audio]
 
     def __iter__(self) -> Iterator[Frame]:
+        pictures, self._begun = self._begun, None
+        if pictures is not None:
+            yield from self._frames(pictures)
+            return
         self.damage = None
         with _open(self.path) as container:
-            stream = _picture_stream(container)
-            stream.thread_type, stream.codec_context.thread_count = "AUTO", codec_threads()
-            for index, picture in enumerate(self._pictures(container, stream)):
-                yield self._frame(picture, index)
+            yield from self._frames(self._pictures(container, _picture_stream(container)))
 
     def __enter__(self) -> "VideoReader":
         return self
@@ -108,11 +113,12 @@ class VideoReader:
         self.close()
 
     def close(self) -> None:
-        """Closes the file."""
+        """Closes the file; to iterate opens it again."""
+        self._begun = None
         self._container.close()
 
-    def _first_picture(self) -> av.VideoFrame:
-        picture = next(self._pictures(self._container, self._stream), None)
+    def _first_picture(self, pictures: Iterator[av.VideoFrame]) -> av.VideoFrame:
+        picture = next(pictures, None)
         if picture is None:
             reason = f" ({self.damage})" if self.damage else ""
             raise VideoError(f"{self.path}: no frame can be decoded{reason}; expected at least one: record it again")
@@ -122,6 +128,10 @@ class VideoReader:
                 f"ffmpeg -i {self.path.name} -vf bwdif progressive.mp4"
             )
         return picture
+
+    def _frames(self, pictures: Iterator[av.VideoFrame]) -> Iterator[Frame]:
+        for index, picture in enumerate(pictures):
+            yield self._frame(picture, index)
 
     def _pictures(self, container: InputContainer, stream: VideoStream) -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
@@ -207,9 +217,11 @@ def _open(path: Path) -> InputContainer:
 
 
 def _picture_stream(container: InputContainer) -> VideoStream:
-    """The stream to read: not a cover picture, where there is another."""
+    """The stream to read, not a cover picture where there is another, ready to be decoded."""
     best = container.streams.best("video")
-    return best if isinstance(best, VideoStream) else container.streams.video[0]
+    stream = best if isinstance(best, VideoStream) else container.streams.video[0]
+    stream.thread_type, stream.codec_context.thread_count = "AUTO", codec_threads()
+    return stream
 
 
 def _start_s(stream: VideoStream) -> float:

@@ -109,6 +109,16 @@ def test_a_reader_may_be_read_twice_and_left_early(make_clip):
         assert (reader.frame_rate, reader.frame_count, reader.size) == (30, 6, (64, 48))
 
 
+def test_every_pass_gives_the_same_frames_also_after_closing(make_clip):
+    with VideoReader(make_clip(options={"bf": "2"})) as reader:
+        passes = [list(reader), list(reader)]
+    passes.append(list(reader))
+    for frames in passes[1:]:
+        for a, b in zip(passes[0], frames, strict=True):
+            assert (a.index, a.time_s) == (b.index, b.time_s)
+            assert all(np.array_equal(p, q) for p, q in zip(a.planes, b.planes, strict=True))
+
+
 def test_frames_outlive_the_reader(make_clip):
     clip = make_clip(frames=30)
     kept, _ = frames_of(clip)
