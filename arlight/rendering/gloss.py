@@ -23,6 +23,15 @@ def octahedral_directions(side: int) -> Array:
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
+def octahedral_texels(directions: Array, side: int) -> NDArray[np.int64]:
+    """Numbers (d,) of the texels of an octahedral map that directions (d, 3) fall on."""
+    x, y, z = (directions / np.abs(directions).sum(axis=1, keepdims=True)).T
+    fold = np.maximum(-z, 0.0)
+    place = np.stack([x + np.copysign(fold, x), y + np.copysign(fold, y)], axis=-1)
+    column, row = np.clip(((place * 0.5 + 0.5) * side).astype(np.int64), 0, side - 1).T
+    return np.asarray(row * side + column)
+
+
 def gloss_rows(reconstruction: Reconstruction, roughness: float, side: int = GLOSS_SIDE) -> NDArray[np.float32]:
     """Rows (side * side, m) of the radiance that a lobe about each texel's direction averages.
 

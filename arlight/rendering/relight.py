@@ -1,5 +1,6 @@
 """Lights an object on the sheet with estimated coefficients and sets it into the frame."""
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -9,6 +10,7 @@ from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
+from arlight.rendering.appearance import Appearance, appearance
 from arlight.rendering.composite import PlaneShader, cover
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.light_rows import LightRows
@@ -137,6 +139,13 @@ class Relighter:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
         view = self._view(camera_from_probe)
         return None if view is None else (view.region, self._draw(view, self._packed(lighting)).copy())
+
+    @cached_property
+    def appearance(self) -> Appearance:
+        """How much of the picture each coefficient of the light makes; worked out when first asked for."""
+        s = self.settings
+        rows = gloss_rows(self._reconstruction, s.roughness)
+        return appearance(self.mesh, self.transfer, rows, s.roughness, s.normal_reflectance, self._frequencies)
 
     def release(self) -> None:
         """Give back what drawing holds, from the thread that renders; it is made again when needed."""

@@ -93,6 +93,14 @@ static inline void carry(const Shading *s, int channel)
         matte[i] = 0.5f * (lit[ends[2 * i]] + lit[ends[2 * i + 1]]);
 }
 
+/* The gloss's share (n,) of what is seen at cosines (n,) to the view. */
+EXPORT HOT void gloss_albedos(
+    const float *cosine, int64_t count, double roughness, double normal_reflectance, float *albedo)
+{
+    for (int64_t i = 0; i < count; i++)
+        albedo[i] = gloss_albedo(greater(cosine[i], 0.02f), (float)roughness, (float)normal_reflectance);
+}
+
 /* Mix one colour of the body's light with what the gloss mirrors, bilinear on its map. */
 static inline void mix(const Shading *s, int channel)
 {

@@ -1,0 +1,165 @@
+"""The compiled renderer: what it covers, whatever it is given, and that OpenGL draws the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from arlight.camera import Pose
+from arlight.rendering.default_object import default_object
+from arlight.rendering.draw import ObjectRenderer
+from arlight.rendering.gloss import GLOSS_SIDE, gloss_rows
+from arlight.rendering.mesh import Mesh
+from arlight.rendering.projection import View, project
+from arlight.rendering.raster import RasterRenderer
+from arlight.rendering.refinement import refined
+from arlight.rendering.shadow import PlaneGrid, PlaneShadow
+from arlight.rendering.transfer import Transfer, precompute_transfer
+from arlight.video.frame import Region
+
+WHITE = np.ones((1, 3), np.float32)
+
+
+def matte_renderer(mesh, radiance, supersampling=1):
+    """Every vertex has its own radiance under unit light, and no gloss."""
+    n = len(mesh.vertices_mm)
+    grid = PlaneGrid((0.0, 0.0), 1.0, 2)
+    shadow = PlaneShadow(grid, np.zeros((4, 1), np.float32), np.ones(1, np.float32), np.ones((2, 2), np.float32))
+    rows = np.broadcast_to(np.asarray(radiance, np.float32), n)[:, None].copy()
+    transfer = Transfer(rows, np.zeros((n, 9), np.float32), shadow)
+    return RasterRenderer(mesh, transfer, np.zeros((GLOSS_SIDE**2, 1), np.float32), 0.5, 0.0, supersampling)
+
+
+def flat_mesh(places, faces, height_mm=0.0):
+    """White triangles at (x, y) on a plane, counter-clockwise from above."""
+    vertices = np.column_stack([places, np.full(len(places), height_mm)])
+    corners = vertices[faces][..., :2]
+    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    clockwise = side[:, 0] * other[:, 1] - side[:, 1] * other[:, 0] < 0.0
+    faces = np.where(clockwise[:, None], faces[:, ::-1], faces).astype(np.int32)
+    normals = np.tile([0.0, 0.0, 1.0], (len(places), 1))
+    return Mesh(vertices, normals, faces, np.ones((len(places), 3), np.float32), closed=True)
+
+
+def drawn(renderer, mesh, camera, pose, light=WHITE, region=None):
+    projected = project(camera, pose, mesh.vertices_mm)
+    view = View(pose, projected, region or projected.region())
+    return renderer.draw(view, light).copy()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_triangles_that_share_edges_cover_every_sample_once(camera, looking_down, seed):
+    """Drawn one at a time they add up to what they cover together: no crack, and no sample twice."""
+    rng = np.random.default_rng(seed)
+    # on whole and half pixels too, where edges run through samples
+    places = np.concatenate(
+        [rng.uniform(-30, 30, (40, 2)), rng.integers(-30, 30, (25, 2)) * 1.0, [[-40, -40], [40, 40]]]
+    )
+    places = np.unique(places, axis=0)
+    faces = Delaunay(places).simplices
+    mesh, pose = flat_mesh(places, faces), looking_down(0.0, 300.0)
+    region = project(camera, pose, mesh.vertices_mm).region()
+    total = sum(
+        drawn(matte_renderer(part, 1.0), part, camera, pose, region=region)[..., 3]
+        for part in (replace(mesh, faces=face[None]) for face in mesh.faces)
+    )
+    together = drawn(matte_renderer(mesh, 1.0), mesh, camera, pose, region=region)[..., 3]
+    assert np.array_equal(total, together)
+    # within the hull, its rim aside, nothing is missing
+    y, x = np.mgrid[region.y0 : region.y1, region.x0 : region.x1]
+    pixels = project(camera, pose, mesh.vertices_mm).pixels
+    hull = Delaunay(pixels.mean(axis=0) + 0.99 * (pixels - pixels.mean(axis=0)))
+    assert np.all(together[hull.find_simplex(np.stack([x, y], axis=-1)) >= 0] == 1.0)
+
+
+def test_radiance_is_interpolated_in_perspective(camera, looking_down):
+    """A long card seen at a slant: radiance that is linear in space is so along the card, not along the picture."""
+    places = np.array([[-10.0, -60.0], [10.0, -60.0], [10.0, 60.0], [-10.0, 60.0]])
+    mesh, pose = flat_mesh(places, np.array([[0, 1, 2], [0, 2, 3]])), looking_down(60.0, 200.0)
+    image = drawn(matte_renderer(mesh, (places[:, 1] + 100.0) / 100.0), mesh, camera, pose)
+    region = project(camera, pose, mesh.vertices_mm).region()
+    for y_mm in (-50.0, -20.0, 0.0, 30.0, 50.0):
+        x, y = np.rint(camera.project(pose, [[0.0, y_mm, 0.0]])[0]).astype(int)
+        toward = pose.rotation.T @ [*camera.rays([[x, y]])[0], 1.0]
+        seen = pose.camera_centre_mm - toward * pose.camera_centre_mm[2] / toward[2]
+        assert image[y - region.y0, x - region.x0, 0] == pytest.approx((seen[1] + 100.0) / 100.0, rel=1e-3)
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize("which", ["camera", "lens_camera"])
+def test_opengl_draws_the_same(request, which, pose, reconstruction):
+    """Coverage to the sample, radiance but for the gloss, which OpenGL works out for every pixel."""
+    camera = request.getfixturevalue(which)
+    mesh = default_object(6000).placed(60.0)
+    transfer = precompute_transfer(mesh, reconstruction, 96, 32)
+    packed = np.asarray(np.random.default_rng(1).uniform(0.0, 0.1, (81, 3)), np.float32)
+    packed[0] = [1.0, 0.8, 0.5]
+    material = (gloss_rows(reconstruction, 0.4), 0.4, 0.04, 2)
+    views = [
+        drawn(kind(mesh, transfer, *material), mesh, camera, pose, packed) for kind in (RasterRenderer, ObjectRenderer)
+    ]
+    ours, theirs = views
+    assert np.mean(ours[..., 3] != theirs[..., 3]) < 1e-3
+    assert np.abs(ours - theirs)[..., :3].mean() < 0.01 * theirs[..., :3].mean()
+
+
+def test_a_picture_drawn_in_bands_is_the_same(camera, pose, monkeypatch):
+    mesh = default_object(1000).placed(60.0)
+    whole = drawn(matte_renderer(mesh, 1.0, 3), mesh, camera, pose)
+    monkeypatch.setattr("arlight.rendering.raster._MOST_SAMPLES", 7000)
+    assert np.array_equal(drawn(matte_renderer(mesh, 1.0, 3), mesh, camera, pose), whole)
+
+
+def test_what_reaches_behind_the_camera_is_left_out_and_the_rest_drawn(camera, pose):
+    near, far = default_object(400).placed(40.0), default_object(400).placed(40.0)
+    behind = replace(near, vertices_mm=near.vertices_mm + pose.camera_centre_mm * 1.3)
+    both = replace(
+        far,
+        vertices_mm=np.concatenate([far.vertices_mm, behind.vertices_mm]),
+        normals=np.concatenate([far.normals, behind.normals]),
+        faces=np.concatenate([far.faces, behind.faces + len(far.vertices_mm)]),
+        base_colour=np.concatenate([far.base_colour, behind.base_colour]),
+    )
+    region = Region(0, 0, 320, 240)
+    expected = drawn(matte_renderer(far, 1.0), far, camera, pose, region=region)
+    assert expected[..., 3].any()
+    assert np.array_equal(drawn(matte_renderer(both, 1.0), both, camera, pose), expected)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e18])
+def test_impossible_poses_draw_nothing(camera, pose, bad):
+    mesh = default_object(400).placed(40.0)
+    for broken in (Pose(pose.rotation, np.array([bad, 0.0, 300.0])), Pose(np.full((3, 3), bad), pose.translation)):
+        image = drawn(matte_renderer(mesh, 1.0), mesh, camera, broken, region=Region(10, 20, 70, 60))
+        assert not image.any()
+
+
+def test_finer_triangles_than_samples_leave_no_hole(camera, looking_down):
+    """Thousands of triangles to a pixel, seen from far away."""
+    mesh, pose = default_object(9000).placed(20.0), looking_down(30.0, 3000.0)
+    image = drawn(matte_renderer(mesh, 1.0, 4), mesh, camera, pose)
+    coarse = default_object(9000).placed(20.0)
+    enclosed = drawn(matte_renderer(coarse, 1.0, 16), coarse, camera, pose)
+    assert image[..., 3].sum() == pytest.approx(enclosed[..., 3].sum(), rel=0.1)
+    assert 0.0 < image[..., 3].max() <= 1.0
+
+
+def test_a_refined_mesh_is_lit_by_its_coarse_vertices(camera, pose):
+    mesh = default_object(2000).placed(60.0)
+    finer = refined(mesh)
+    lit = np.linspace(0.5, 1.5, len(mesh.vertices_mm)).astype(np.float32)
+    both = []
+    for refinement, object_ in ((finer, mesh), (None, finer.mesh)):
+        renderer = matte_renderer(object_, lit if refinement else finer.carried(lit), 2)
+        if refinement is not None:
+            rows = lit[:, None]
+            grid = PlaneGrid((0.0, 0.0), 1.0, 2)
+            shadow = PlaneShadow(
+                grid, np.zeros((4, 1), np.float32), np.ones(1, np.float32), np.ones((2, 2), np.float32)
+            )
+            transfer = Transfer(rows, np.zeros((len(lit), 9), np.float32), shadow)
+            nothing = np.zeros((GLOSS_SIDE**2, 1), np.float32)
+            renderer = RasterRenderer(mesh, transfer, nothing, 0.5, 0.0, 2, refinement=refinement)
+        both.append(drawn(renderer, finer.mesh, camera, pose))
+    np.testing.assert_allclose(both[0], both[1], atol=1e-5)
