@@ -29,7 +29,7 @@ def make_relighter(
     Raises:
         MeshError: the object cannot be used.
     """
-    mesh = default_object() if options.object is None else _read(options.object)
+    mesh = default_object(options.settings.lit_faces) if options.object is None else _read(options.object)
     return _PreparedRelighter(mesh, probe, camera, options.settings, order)
 
 

@@ -90,14 +90,15 @@ class Relighter:
         self._camera = camera
         frequencies = np.asarray(probe.frequencies)
         self._frequencies = frequencies if order is None else frequencies[orders_up_to(frequencies, order)]
-        self.mesh = mesh.placed(s.size_mm, s.position_mm, s.yaw_deg)
+        self.mesh = self._fitted(mesh).placed(s.size_mm, s.position_mm, s.yaw_deg)
         self._reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
         self.transfer = precompute_transfer(self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress)
         shadow = self.transfer.shadow
         self._plane_rows = LightRows([shadow.hidden_rows, shadow.open_row[None]], self._reconstruction.independent)
         self._plane_shader = PlaneShader(camera, shadow.grid)
         self._projector = Projector(camera)
-        self._refinement = refined(self.mesh) if self._refines() else None
+        refines = s.renderer == "native" and len(self.mesh.faces) <= s.lit_faces
+        self._refinement = refined(self.mesh) if refines else None
         drawn = self.mesh if self._refinement is None else self._refinement.mesh
         self._vertices = np.ascontiguousarray(drawn.vertices_mm, np.float32)
         self._opened: ObjectDrawer | None = None
@@ -180,10 +181,16 @@ class Relighter:
             return ObjectRenderer(self.mesh, self.transfer, *material)
         return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent, self._refinement)
 
-    def _refines(self) -> bool:
-        """Whether there are triangles to spare; the other renderers draw the mesh as it is lit."""
+    def _fitted(self, mesh: Mesh) -> Mesh:
+        """The mesh, simplified if there are more triangles than are to be drawn."""
         budget = self.settings.mesh_faces
-        return self.settings.renderer == "native" and (budget is None or 4 * len(self.mesh.faces) <= budget)
+        if budget is None or len(mesh.faces) <= budget:
+            return mesh
+        # here, because it loads what reads meshes
+        from arlight.rendering.tessellation import fit_to_budget
+
+        # a closed surface has half as many vertices
+        return fit_to_budget(mesh, max(budget // 2, 4))
 
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
         count = len(lighting.frequencies)

@@ -6,6 +6,9 @@ from typing import Literal
 RendererName = Literal["native", "moderngl", "pyrender"]
 
 
+_REFINED_FACES = 16_000
+
+
 @dataclass(frozen=True, slots=True)
 class RelightSettings:
     """How the object stands on the sheet and how it is lit."""
@@ -28,8 +31,14 @@ class RelightSettings:
     """Side of the map of the shadow on the sheet."""
     supersampling: int = 2
     """Samples along a pixel's side."""
-    mesh_faces: int | None = 16_000
-    """Triangles to draw. A mesh of at most a quarter of them is refined after it is lit; None refines any mesh."""
+    mesh_faces: int | None = None
+    """Triangles to draw at most; a mesh that has more is simplified. Up to a quarter of them are refined after they are
+    lit, by default if that makes no more than 16 000. Only the native renderer refines."""
     renderer: RendererName = "native"
     """`native`: precomputed transfer, drawn by compiled code; `moderngl`: the same by OpenGL, with the gloss of every
     pixel; `pyrender`: the light as a few directional lights with shadow maps, slow."""
+
+    @property
+    def lit_faces(self) -> int:
+        """Triangles of a mesh that may be refined."""
+        return (self.mesh_faces or _REFINED_FACES) // 4

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -37,7 +39,6 @@ def test_default_object_is_closed_outward_and_always_the_same():
     mesh, again = default_object(), default_object()
     assert np.array_equal(mesh.vertices_mm, again.vertices_mm)
     assert mesh.closed
-    assert len(mesh.vertices_mm) < 6000
     corners = mesh.vertices_mm[mesh.faces]
     assert np.sum(np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]) > 0
     faces_normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -85,3 +86,35 @@ def test_no_faces_is_refused():
 def test_impossible_size_is_refused(size):
     with pytest.raises(MeshError, match="positive length"):
         default_object().placed(size)
+
+
+@pytest.mark.parametrize("faces", [400, 1000, 2500, 4000, 16000])
+def test_the_default_object_is_the_same_at_any_number_of_triangles(faces):
+    mesh, fine = default_object(faces), default_object(40_000)
+    assert 0.8 * faces < len(mesh.faces) <= max(faces, 500)
+    placed, expected = mesh.placed(50.0), fine.placed(50.0)
+    assert np.allclose(mesh.extent_mm, fine.extent_mm)
+    # vertices lie on the smooth surface, so they stay within its box and reach nearly to its walls
+    assert np.all(placed.vertices_mm.max(axis=0) <= expected.vertices_mm.max(axis=0) + 0.02)
+    assert np.all(placed.vertices_mm.max(axis=0) > expected.vertices_mm.max(axis=0) - 3.0)
+    assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1.0)
+    corners = mesh.vertices_mm[mesh.faces]
+    assert np.sum(np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]) > 0
+
+
+def test_the_default_object_s_normals_are_the_surface_s():
+    mesh = default_object(40_000)
+    assert np.quantile(np.sum(mesh.normals * smooth_normals(mesh.vertices_mm, mesh.faces), axis=1), 0.01) > 0.98
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 35.0])
+def test_a_mesh_with_a_box_of_its_own_is_placed_by_that(yaw_deg):
+    box = from_trimesh(trimesh.creation.box(extents=(4.0, 2.0, 1.0)))
+    low, high = box.vertices_mm.min(axis=0), box.vertices_mm.max(axis=0)
+    boxed = replace(box, box_mm=np.stack([low, high]))
+    assert np.allclose(
+        boxed.placed(80.0, (5.0, -7.0), yaw_deg).vertices_mm, box.placed(80.0, (5.0, -7.0), yaw_deg).vertices_mm
+    )
+    halved = replace(box, box_mm=np.stack([2.0 * low, 2.0 * high])).placed(80.0)
+    assert np.allclose(halved.extent_mm, [40.0, 20.0, 10.0])
+    assert np.allclose(boxed.standing_upright().extent_mm, [4.0, 1.0, 2.0])

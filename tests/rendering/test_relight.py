@@ -189,3 +189,50 @@ def test_made_for_a_lower_order_it_takes_the_light_up_to_there(probe, camera, po
         relighter.draw_object(pose, whole)
     with pytest.raises(ProbeError, match="orders 0 to 5"):
         Relighter(default_object(), probe, camera, QUICK, order=6)
+
+
+def test_a_budget_of_triangles_is_kept_whatever_the_mesh(probe, camera, pose, lighting_of, environment):
+    fine = from_trimesh(trimesh.creation.icosphere(subdivisions=4))
+    whole = Relighter(fine, probe, camera, QUICK)
+    few = Relighter(fine, probe, camera, replace(QUICK, mesh_faces=1000))
+    assert len(few.mesh.faces) <= 1000 < len(whole.mesh.faces)
+    lighting = lighting_of(environment)
+    (region, expected), (other, image) = (relighter.draw_object(pose, lighting) for relighter in (whole, few))
+    assert max(abs(a - b) for a, b in zip(region, other, strict=True)) <= 2
+    assert image[..., :3].sum() == pytest.approx(expected[..., :3].sum(), rel=0.03)
+
+
+@pytest.mark.parametrize("order", [0, 1, 3])
+def test_light_of_a_lower_order_gives_what_a_relighter_of_that_order_gives(
+    relighter, probe, camera, pose, lighting_of, environment, order
+):
+    low = lighting_of(environment).truncated(order)
+    own = Relighter(default_object(), probe, camera, QUICK, order=order)
+    (_, image), (_, expected) = relighter.draw_object(pose, low), own.draw_object(pose, low)
+    assert np.allclose(image, expected, atol=2e-3 * expected.max())
+    frame = frame_of()
+    given, wanted = (made.render(frame, pose, low).linear_rgb() for made in (relighter, own))
+    assert np.abs(given - wanted).max() < 0.01
+
+
+@pytest.mark.parametrize("renderer", ["moderngl", "pyrender"])
+def test_the_other_renderers_take_light_of_a_lower_order_too(probe, camera, pose, lighting_of, environment, renderer):
+    low = lighting_of(environment).truncated(2)
+    settings = replace(QUICK, renderer=renderer)
+    image = Relighter(default_object(), probe, camera, settings).draw_object(pose, low)[1]
+    own = Relighter(default_object(), probe, camera, settings, order=2).draw_object(pose, low)[1]
+    assert image[..., :3].sum() == pytest.approx(own[..., :3].sum(), rel=0.02)
+
+
+def test_the_renderers_differ_in_the_object_alone(probe, camera, pose, lighting_of, environment):
+    """The renderers differ in the object alone."""
+    frame, lighting = frame_of(), lighting_of(environment)
+    native = Relighter(default_object(4000), probe, camera, QUICK)
+    opengl = Relighter(default_object(4000), probe, camera, replace(QUICK, renderer="moderngl"))
+    region, image = opengl.draw_object(pose, lighting)
+    aside = np.ones((240, 320), bool)
+    aside[region.y0 : region.y1, region.x0 : region.x1] = False
+    ours, theirs = (relighter.render(frame, pose, lighting).linear_rgb() for relighter in (native, opengl))
+    assert np.array_equal(ours[aside], theirs[aside])
+    assert np.abs(ours - theirs).mean() < 0.002
+    assert image[..., 3].max() == 1.0
