@@ -10,6 +10,8 @@ from arlight.estimation.lighting import Lighting
 
 Array = NDArray[np.float64]
 
+_ONES = np.ones(3)
+
 
 class LightingFilter:
     """Follows the lighting; `update` with an estimate, or without one while the sheet is hidden."""
@@ -39,7 +41,7 @@ class LightingFilter:
             Coefficients with covariance; None before the first estimate. The first one, and one of other frequencies
             than before, is returned as it is.
         """
-        exposure = np.ones(3) if exposure is None else np.ascontiguousarray(exposure, float)
+        exposure = _ONES if exposure is None else exposure
         if measured is not None and (self._light is None or len(measured.frequencies) != len(self._light.frequencies)):
             self._light, self._time_s = FollowedLight(measured, exposure), time_s
             return measured
@@ -47,9 +49,6 @@ class LightingFilter:
             return None
         time_s = max(time_s, self._time_s)
         dt, self._time_s = time_s - self._time_s, time_s
-        if measured is None and hidden:
-            self._light.stop()
-        self._light.predict(dt)
-        if measured is not None and not self._light.take_in(measured, exposure, dt):
-            return measured
-        return self._light.tell(exposure, time_s, math.nan if measured is None else measured.chi2)
+        # nothing confirms a trend while the sheet is hidden
+        told = self._light.follow(measured, exposure, dt, time_s, still=hidden)
+        return measured if told is None else told

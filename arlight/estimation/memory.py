@@ -1,7 +1,6 @@
 """A Kalman filter with fading memory: what is older than its memory counts less and less, at any frame rate."""
 
 import ctypes
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +10,30 @@ from arlight.native import Workspace, address, library
 
 Array = NDArray[np.float64]
 
-_LIBRARY = library(__file__, "memory")
-_LIBRARY.predict.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
-_LIBRARY.correct.argtypes = [ctypes.c_void_p] * 3
-_LIBRARY.judge.argtypes = [ctypes.c_void_p] * 4
-_LIBRARY.tell.argtypes = [ctypes.c_void_p, *([ctypes.c_double] * 4), *([ctypes.c_void_p] * 3)]
+_LIBRARY = library(__file__, "followed_light")
+_LIBRARY.memory_start.argtypes = [ctypes.c_void_p] * 4
+_LIBRARY.memory_predict.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+_LIBRARY.memory_free_level.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_double]
+_LIBRARY.memory_correct.argtypes = _LIBRARY.memory_judge.argtypes = [ctypes.c_void_p] * 3
+_LIBRARY.memory_averaged.argtypes = [ctypes.c_void_p]
+_LIBRARY.memory_tell.argtypes = [ctypes.c_void_p, *([ctypes.c_double] * 3), *([ctypes.c_void_p] * 2)]
+_LIBRARY.memory_averaged.restype = ctypes.c_double
+for _function in ("start", "predict", "free_level", "correct", "judge", "tell"):
+    getattr(_LIBRARY, f"memory_{_function}").restype = None
 _ARRAYS = ("values", "velocity", "variance", "cross", "moving", "corrected")
 
 
-class _Workspace(Workspace):
-    """What memory.c calls Memory."""
+class _Shared(Workspace):
+    """What memory.h calls Memory."""
 
     _fields_ = (
         ("channels", ctypes.c_int64),
         ("size", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in _ARRAYS),
+        ("memory_s", ctypes.c_double),
+        ("trend", ctypes.c_int64),
+        *((name, ctypes.c_double) for name in ("growth", "weights", "squared_weights")),
+        ("level_freed", ctypes.c_int64),
     )
 
 
@@ -38,51 +46,36 @@ class FadingMemory:
 
     Args:
         memory_s: the memory [s].
-        trend: whether the numbers have a velocity.
         channels, size: shape (c, n) of the numbers, arrays of which stay where they are. The first of each channel is
             its level, which `judge` leaves out.
+        trend: whether the numbers have a velocity.
     """
 
     def __init__(self, memory_s: float, channels: int, size: int, *, trend: bool) -> None:
-        self._memory_s = memory_s
-        self._trend = trend
         arrays = dict(zip(_ARRAYS, np.zeros((len(_ARRAYS), channels, size)), strict=True))
         self.values, self.velocity, self.variance = (arrays[name] for name in _ARRAYS[:3])
         self.cross, self.moving, self.corrected = (arrays[name] for name in _ARRAYS[3:])
-        self._workspace = _Workspace(channels, size)
-        self._workspace.hold(arrays)
-        self._at = ctypes.byref(self._workspace)
-        self._means = np.zeros(3)
-        self._means_at = address(self._means, np.float64)
-        self.values_at, self.variance_at = (address(a, np.float64) for a in (self.values, self.variance))
+        self.shared = _Shared(channels, size, memory_s=memory_s, trend=trend)
+        """The compiled part's view of it."""
+        self.shared.hold(arrays)
+        self._at = ctypes.byref(self.shared)
 
     def start(self, values: Array, variance: Array, rate: Array) -> None:
         """Begin with values (c, n), their variance (c, n) and the spread (c, n) of velocities [1/s]."""
-        self.values[:] = values
-        self.variance[:] = self.corrected[:] = variance
-        self.velocity[:] = self.cross[:] = 0.0
-        self.moving[:] = rate**2 if self._trend else 0.0
-        self._growth = 1.0
-        self._level_freed = False
-        self._weights = self._squared_weights = 1.0
+        arrays = (np.ascontiguousarray(array, float) for array in (values, variance, rate**2))
+        _LIBRARY.memory_start(self._at, *(address(array, np.float64) for array in arrays))
 
     def predict(self, dt: float, ceiling: Array) -> None:
         """Carry the state on by dt [s]; its variance grows up to `ceiling` (c, n) and no further."""
-        growth = math.exp(min(dt / self._memory_s, 50.0))
-        self._growth *= growth
-        _LIBRARY.predict(self._at, dt, growth, address(ceiling, np.float64))
+        _LIBRARY.memory_predict(self._at, dt, address(ceiling, np.float64))
 
     def free_level(self, channel: int, variance: float) -> None:
         """Grant a channel's level a sudden change of some variance."""
-        self.variance[channel, 0] += variance
-        self._level_freed = True
+        _LIBRARY.memory_free_level(self._at, channel, variance)
 
     def correct(self, innovation: Array, measured: RelativeLight) -> None:
         """Take in a measurement by how far each of its values is taken to lie from the memory's (c, n)."""
-        _LIBRARY.correct(self._at, address(innovation, np.float64), measured.variance_at)
-        self._weights = self._weights / self._growth + 1.0
-        self._squared_weights = self._squared_weights / self._growth**2 + 1.0
-        self._growth = 1.0
+        _LIBRARY.memory_correct(self._at, address(innovation, np.float64), ctypes.byref(measured.shared))
 
     def judge(self, measured: RelativeLight) -> tuple[float, float, float]:
         """Means over all but the levels of how a measurement compares.
@@ -91,8 +84,9 @@ class FadingMemory:
             Its squared distance from the values over the variance of that distance; the same over its own variance;
             the variance of `corrected` over its own.
         """
-        _LIBRARY.judge(self._at, measured.values_at, measured.variance_at, self._means_at)
-        surprise, shown, kept = self._means.tolist()
+        means = (ctypes.c_double * 3)()
+        _LIBRARY.memory_judge(self._at, ctypes.byref(measured.shared), means)
+        surprise, shown, kept = means
         return surprise, shown, kept
 
     @property
@@ -101,9 +95,7 @@ class FadingMemory:
 
         `variance` allows for change: of measurements of weight w it is R / sum w, where R sum w^2 / (sum w)^2 is due.
         """
-        share = self._squared_weights / self._weights
-        # a straight line that fades: 1.25 (1 - fading) R at its end, where `variance` is 2 (1 - fading) R
-        return min(1.25 * share, 1.0) if self._trend else share
+        return float(_LIBRARY.memory_averaged(self._at))
 
     def tell(self, light: RelativeLight, weight: float, independent: float, left: float, typical: Array) -> None:
         """Add a weight of the values, and of the variances that their errors have, to a light.
@@ -115,10 +107,6 @@ class FadingMemory:
             left: share of a measurement's variance that averaging leaves beside.
             typical: (c, n) variance of a measurement.
         """
-        # without measurements the light may change
-        grown = weight * self._growth
-        kept_level = independent * (1.0 if self._level_freed else self.averaged)
-        _LIBRARY.tell(
-            self._at, weight, grown * independent * self.averaged, grown * kept_level, grown * left,
-            address(typical, np.float64), light.values_at, light.variance_at,
-        )  # fmt: skip
+        _LIBRARY.memory_tell(
+            self._at, weight, independent, left, address(typical, np.float64), ctypes.byref(light.shared)
+        )

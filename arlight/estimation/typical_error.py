@@ -7,36 +7,36 @@ coefficients that is the Kalman filter of the whole vector, P (P + R)^-1, whose 
 """
 
 import ctypes
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.memory import FadingMemory
 from arlight.estimation.relative_light import RelativeLight
-from arlight.native import Workspace, library
+from arlight.native import Workspace, address, library
 
 Array = NDArray[np.float64]
 
-_LIBRARY = library(__file__, "typical_error")
-_LIBRARY.average.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
-_LIBRARY.uncertainty.argtypes = [ctypes.c_void_p]
-_LIBRARY.uncertainty.restype = ctypes.c_double
-_LIBRARY.weigh.argtypes = [ctypes.c_void_p] * 2
+_LIBRARY = library(__file__, "followed_light")
+_LIBRARY.typical_start.argtypes = _LIBRARY.typical_weigh.argtypes = [ctypes.c_void_p] * 2
+_LIBRARY.typical_average.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
+for _function in ("start", "weigh", "average"):
+    getattr(_LIBRARY, f"typical_{_function}").restype = None
 _LANES = 16
 """Floats by which rows of factors are padded (cholesky.h)."""
-_FRAME = ("values", "variance", "scale", "slope", "arm")
 
 
-class _Workspace(Workspace):
-    """What typical_error.c calls TypicalError."""
+class _Shared(Workspace):
+    """What typical_error.h calls TypicalError."""
 
     _fields_ = (
         ("channels", ctypes.c_int64),
         ("size", ctypes.c_int64),
-        *((name, ctypes.c_void_p) for name in ("covariance", "diagonal", *_FRAME)),
+        ("memory_s", ctypes.c_double),
+        ("weight", ctypes.c_double),
+        *((name, ctypes.c_void_p) for name in ("covariance", "diagonal", "frame")),
         ("many", ctypes.c_int64),
-        *((name, ctypes.POINTER(ctypes.c_void_p)) for name in ("memory_values", "memory_variance")),
+        ("memories", ctypes.POINTER(ctypes.c_void_p)),
         *((name, ctypes.c_void_p) for name in ("innovation", "terms", "factor", "sides")),
     )
 
@@ -47,14 +47,10 @@ class TypicalError:
     Args:
         memory_s: time over which covariances are averaged [s].
         frame: the relative light of the frames, which is taken anew for each.
-        memories: whose innovations are weighed.
+        memories: whose innovations are weighed; the first one's gain counts for all.
     """
 
     def __init__(self, memory_s: float, frame: RelativeLight, memories: tuple[FadingMemory, ...]) -> None:
-        self._memory_s = memory_s
-        self._frame = frame
-        # their arrays are pointed at
-        self._memories = memories
         channels, size = frame.values.shape
         stride = -(-size // _LANES) * _LANES
         self.covariance = np.zeros((channels, size, size))
@@ -62,42 +58,42 @@ class TypicalError:
         self.diagonal = np.zeros((channels, size))
         """(c, n) its variances."""
         self._innovation = np.zeros((len(memories), channels, size))
+        # pointed at
+        self._frame, self._memories = frame, memories
         pointers = ctypes.c_void_p * len(memories)
-        self._workspace = _Workspace(channels, size)
-        self._workspace.many = len(memories)
-        self._workspace.memory_values = pointers(*(memory.values_at for memory in memories))
-        self._workspace.memory_variance = pointers(*(memory.variance_at for memory in memories))
-        self._workspace.hold(
+        self.shared = _Shared(
+            channels, size, memory_s, frame=ctypes.addressof(frame.shared), many=len(memories),
+            memories=pointers(*(ctypes.addressof(memory.shared) for memory in memories)),
+        )  # fmt: skip
+        """The compiled part's view of it."""
+        self.shared.hold(
             {
                 "covariance": self.covariance,
                 "diagonal": self.diagonal,
-                **{name: getattr(frame, name) for name in _FRAME},
                 "innovation": self._innovation,
                 "terms": np.zeros((4, size)),
                 "factor": np.zeros((stride, stride), np.float32),
                 "sides": np.zeros((2, len(memories) + 1, stride), np.float32),
             }
         )
-        self._at = ctypes.byref(self._workspace)
+        self._at = ctypes.byref(self.shared)
 
-    def start(self) -> None:
-        """Begin with the frame's covariance."""
-        self.covariance[:] = 0.0
-        _LIBRARY.average(self._at, self._frame.covariance_at, 0.0, 1.0)
-        self._weight = 1.0
+    def start(self, covariance: Array) -> None:
+        """Begin with the covariance (c, n, n) of the frame's light, not relative."""
+        _LIBRARY.typical_start(self._at, address(covariance, np.float64))
 
-    def average(self, dt: float) -> None:
-        """Take in the frame's covariance dt [s] after the last one's; a less certain frame counts less."""
-        faded = self._weight * math.exp(-dt / self._memory_s)
-        weight = 1.0 / _LIBRARY.uncertainty(self._at)
-        self._weight = faded + weight
-        _LIBRARY.average(self._at, self._frame.covariance_at, faded / self._weight, weight / self._weight)
+    def average(self, covariance: Array, dt: float) -> None:
+        """Take in the same dt [s] after the last frame; a less certain frame counts less."""
+        _LIBRARY.typical_average(self._at, address(covariance, np.float64), dt)
 
-    def weigh(self) -> Array:
+    def weigh(self, covariance: Array) -> Array:
         """Innovations (memories, c, n) of the frame that each of the memories' numbers should take in by itself.
 
         A level that is less certain than the rest, as after a change of exposure, first takes what only its shift
         explains; the array is overwritten by the next call.
+
+        Args:
+            covariance: (c, n, n) of the frame's light, not relative.
         """
-        _LIBRARY.weigh(self._at, self._frame.covariance_at)
+        _LIBRARY.typical_weigh(self._at, address(covariance, np.float64))
         return self._innovation

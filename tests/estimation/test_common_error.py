@@ -106,15 +106,12 @@ def test_the_exposures_level_is_not_judged():
     assert averaged(jumping)[0].independent == pytest.approx(averaged(strayed)[0].independent)
 
 
-def test_forgetting_begins_again_and_another_light_does_not():
+def test_another_light_does_not_change_what_errors_are_like():
     common, _, _ = averaged(errors(0.2, 3.0, 200))
     learnt, frame = common.independent, RelativeLight(3, SIZE)
     frame.values[:], frame.variance[:] = TRUTH, VARIANCE
     common.start(frame)
     assert common.independent == learnt
-    common.reset()
-    common.start(frame)
-    assert common.independent == 0.0
 
 
 def test_shares_are_those_of_second_differences_written_out():

@@ -1,5 +1,7 @@
 """Still, moving, switched and hidden light, seen through noise that is what its covariance says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -326,3 +328,76 @@ def test_a_steady_exposure_is_averaged():
         lighting = filter_.update(source.measure(natural(3), frame * FRAME_S), frame * FRAME_S)
         levels.append(lighting.coefficients[0].real - 1.5)
     assert np.sqrt(np.mean(np.square(levels[50:]))) < 0.35 * 0.01
+
+
+def test_a_known_exposure_changes_nothing():
+    plain, exposed_filter, source = LightingFilter(), LightingFilter(), Source(sigma=0.01)
+    for frame in range(60):
+        time_s = frame * FRAME_S
+        gain, measured = exposure(time_s), source.measure(ramp(time_s), time_s)
+        one = plain.update(measured, time_s)
+        other = exposed_filter.update(exposed(measured, gain), time_s, gain)
+        np.testing.assert_allclose(other.coefficients, one.coefficients * gain, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(other.covariance, exposed(one, gain).covariance, rtol=1e-5, atol=1e-10)
+
+
+def test_a_frame_that_was_left_out_is_predicted_with_the_trend():
+    left_out, hidden, source = LightingFilter(), LightingFilter(), Source(sigma=0.002)
+    for frame in range(50):
+        measured = source.measure(ramp(frame * FRAME_S), frame * FRAME_S)
+        for filter_ in (left_out, hidden):
+            filter_.update(measured, frame * FRAME_S)
+    later = 51 * FRAME_S
+    predicted, kept = left_out.update(None, later, hidden=False), hidden.update(None, later)
+    assert error(predicted, ramp(later)) < 0.5 * error(kept, ramp(later))
+    # and what follows is taken in as ever
+    measured = source.measure(ramp(later + FRAME_S), later + FRAME_S)
+    assert error(left_out.update(measured, later + FRAME_S), ramp(later + FRAME_S)) < 0.005
+
+
+def test_what_was_told_stays_as_it_was():
+    filter_, source = LightingFilter(), Source()
+    told = [filter_.update(source.measure(natural(3), frame * FRAME_S), frame * FRAME_S) for frame in range(5)]
+    copies = [(light.coefficients.copy(), light.covariance.copy()) for light in told]
+    for frame in range(5, 20):
+        filter_.update(source.measure(natural(4), frame * FRAME_S), frame * FRAME_S)
+    for light, (coefficients, covariance) in zip(told, copies, strict=True):
+        np.testing.assert_array_equal(light.coefficients, coefficients)
+        np.testing.assert_array_equal(light.covariance, covariance)
+
+
+def test_memory_laid_out_in_another_way_is_read_all_the_same():
+    filters, source = (LightingFilter(), LightingFilter()), Source()
+    for frame in range(6):
+        one = source.measure(natural(3), frame * FRAME_S)
+        turned = Lighting(
+            FREQUENCIES, np.asfortranarray(one.coefficients), one.covariance.transpose(0, 2, 1), one.time_s, 1.0
+        )
+        lights = [f.update(light, one.time_s) for f, light in zip(filters, (one, turned), strict=True)]
+        np.testing.assert_allclose(lights[1].coefficients, lights[0].coefficients, rtol=1e-9)
+
+
+def test_an_estimate_of_another_order_is_followed_anew():
+    filter_, source = LightingFilter(), Source()
+    for frame in range(10):
+        filter_.update(source.measure(natural(3), frame * FRAME_S), frame * FRAME_S)
+    lower = source.measure(natural(3), 0.4).truncated(1)
+    np.testing.assert_array_equal(filter_.update(lower, 0.4).coefficients, lower.coefficients)
+    assert filter_.update(lower, 0.44).order == 1
+
+
+def test_an_estimate_whose_parts_do_not_fit_is_refused():
+    filter_, source = LightingFilter(), Source()
+    measured = source.measure(natural(3), 0.0)
+    filter_.update(measured, 0.0)
+    with pytest.raises(ValueError, match="expected"):
+        filter_.update(replace(measured, covariance=measured.covariance[:, 1:, 1:]), 0.1)
+
+
+def test_level_zero_alone_is_filtered_too():
+    filter_, source = LightingFilter(), Source(sigma=0.02)
+    for frame in range(60):
+        measured = source.measure(natural(3), frame * FRAME_S).truncated(0)
+        lighting = filter_.update(measured, frame * FRAME_S)
+    assert_is_covariance(lighting)
+    assert np.abs(lighting.coefficients[0].real - 1.5).max() < 0.4 * 0.02

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from arlight.estimation.lighting import Lighting
 from arlight.estimation.memory import FadingMemory
 from arlight.estimation.relative_light import RelativeLight
 from arlight.estimation.typical_error import TypicalError
@@ -46,7 +45,8 @@ class Scene:
             slope = values[c, 0] * np.eye(self.size)
             slope[1:, 0], slope[0, 0] = values[c, 1:], 1.0
             absolute[c] = slope @ relative[c] @ slope.T
-        self.light.take(Lighting(self.frequencies, unpack_real(packed.T), absolute, 0.0, 1.0), np.ones(3))
+        self.light.take(unpack_real(packed.T), absolute, np.ones(3))
+        self.absolute = absolute
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -57,9 +57,9 @@ def test_the_average_is_that_of_the_covariances_by_their_certainty(order):
     for number, covariance in enumerate(covariances):
         scene.show(scene.values, covariance)
         if number == 0:
-            scene.typical.start()
+            scene.typical.start(scene.absolute)
             continue
-        scene.typical.average(0.3)
+        scene.typical.average(scene.absolute, 0.3)
         faded = weight * np.exp(-0.3 / 1.5)
         new = 1.0 / np.mean(np.einsum("cii->ci", covariance) / np.einsum("cii->ci", expected))
         weight = faded + new
@@ -82,14 +82,14 @@ def test_with_one_gain_it_is_the_kalman_filter_of_the_vector(order, known, free)
     scene = Scene(order)
     typical, measured = scene.covariance(4, 10), scene.covariance(5, 10)
     scene.show(scene.values, typical)
-    scene.typical.start()
+    scene.typical.start(scene.absolute)
     found = scene.values + 2.0 * scene.deviation * np.random.default_rng(6).normal(size=scene.values.shape)
     scene.show(found, measured)
     # the second memory shares the first one's factor, which is its own where as much is known
     freedoms = ((free, 0.0, 0.5 * free), (0.0, 3.0 * free, 0.0))
     for memory, freed in zip(scene.memories, freedoms, strict=True):
         remember(scene, memory, known, freed)
-    for memory, innovation, freed in zip(scene.memories, scene.typical.weigh(), freedoms, strict=True):
+    for memory, innovation, freed in zip(scene.memories, scene.typical.weigh(scene.absolute), freedoms, strict=True):
         memory.correct(innovation, scene.light)
         for c in range(3):
             prior = known * typical[c]
@@ -102,7 +102,7 @@ def test_what_cannot_be_factored_is_taken_number_by_number():
     scene = Scene(2)
     covariance = scene.covariance(7, 10)
     scene.show(scene.values, covariance)
-    scene.typical.start()
+    scene.typical.start(scene.absolute)
     broken = covariance.copy()
     broken[1, 3, 5] = broken[1, 5, 3] = 3.0 * np.sqrt(covariance[1, 3, 3] * covariance[1, 5, 5])
     found = scene.values + scene.deviation
@@ -110,9 +110,9 @@ def test_what_cannot_be_factored_is_taken_number_by_number():
     for memory in scene.memories:
         remember(scene, memory, 0.1)
     for _ in range(2):
-        for innovation in scene.typical.weigh():
+        for innovation in scene.typical.weigh(scene.absolute):
             np.testing.assert_allclose(innovation[1], found[1] - scene.values[1], rtol=1e-9)
             # equal correlations cancel, in the other channels and in the next frame
             np.testing.assert_allclose(innovation[::2], (found - scene.values)[::2], rtol=1e-3)
     scene.show(found, covariance)
-    np.testing.assert_allclose(scene.typical.weigh()[0], found - scene.values, rtol=1e-3)
+    np.testing.assert_allclose(scene.typical.weigh(scene.absolute)[0], found - scene.values, rtol=1e-3)

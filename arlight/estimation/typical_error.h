@@ -1,40 +1,34 @@
 /* The typical covariance of a frame's error: averaged over time, what it makes of innovations, and of error bars. */
+#ifndef ARLIGHT_TYPICAL_ERROR_H
+#define ARLIGHT_TYPICAL_ERROR_H
+
 #include "cholesky.h"
-#include "relative_light.h"
+#include "memory.h"
 
 static const double least_freedom = 1e-3;
 
 typedef struct {
     int64_t channels;
     int64_t size;
-    double *covariance; /* (channels, size, size) typical covariance of relative light */
-    double *diagonal;   /* (channels, size) its diagonal */
-    double *values;     /* (channels, size) a frame's relative light */
-    double *variance;   /* (channels, size) its variances */
-    double *scale;      /* (channels, size) the terms in which its covariance is read (`relative_light.h`) */
-    double *slope;
-    double *arm;
-    int64_t many;       /* memories whose innovations are weighed; the first one's gain is everyone's */
-    double **memory_values;   /* (many) of (channels, size) */
-    double **memory_variance; /* (many) of (channels, size) */
-    double *innovation; /* (many, channels, size) */
-    double *terms;      /* (4, size) scratch */
-    float *factor;      /* (stride, stride) scratch: Cholesky factor of one channel's correlations (`cholesky.h`) */
-    float *sides;       /* (2, many + 1, stride) scratch */
+    double memory_s;     /* time over which covariances are averaged [s] */
+    double weight;       /* sum of the frames' faded weights */
+    double *covariance;  /* (channels, size, size) typical covariance of relative light */
+    double *diagonal;    /* (channels, size) its diagonal */
+    const RelativeLight *frame; /* the last frame */
+    int64_t many;        /* memories whose innovations are weighed; the first one's gain is everyone's */
+    Memory **memories;   /* (many) */
+    double *innovation;  /* (many, channels, size) */
+    double *terms;       /* (4, size) scratch */
+    float *factor;       /* (stride, stride) scratch: Cholesky factor of one channel's correlations (`cholesky.h`) */
+    float *sides;        /* (2, many + 1, stride) scratch */
 } TypicalError;
-
-static Terms terms_of(const TypicalError *typical, int channel)
-{
-    int64_t at = channel * typical->size;
-    return (Terms){typical->scale + at, typical->slope + at, typical->arm + at};
-}
 
 /* One channel's average: keep times the old covariance and add times the frame's. */
 static HOT void average_channel(const TypicalError *typical, int channel, const double *restrict frame, double keep,
                                 double add)
 {
     int n = (int)typical->size;
-    Terms terms = terms_of(typical, channel);
+    Terms terms = terms_of(typical->frame, channel);
     const double *restrict scale = terms.scale, *restrict slope = terms.slope, *restrict arm = terms.arm;
     double *restrict all = typical->covariance + (int64_t)channel * n * n;
     for (int i = 0; i < n; i++) {
@@ -47,28 +41,43 @@ static HOT void average_channel(const TypicalError *typical, int channel, const 
     }
 }
 
-/* Averages a frame's covariance (channels, size, size) into the typical one. */
-EXPORT void average(const TypicalError *typical, const double *frame, double keep, double add)
-{
-    for (int c = 0; c < typical->channels; c++)
-        average_channel(typical, c, frame + c * typical->size * typical->size, keep, add);
-}
-
 /* Mean of the frame's variances over the typical ones. */
-EXPORT double uncertainty(const TypicalError *typical)
+static double uncertainty(const TypicalError *typical)
 {
     int count = (int)(typical->channels * typical->size);
     double sum = 0.0;
     for (int j = 0; j < count; j++)
-        sum += typical->variance[j] / typical->diagonal[j];
+        sum += typical->frame->variance[j] / typical->diagonal[j];
     return sum / count;
+}
+
+/* Begins with the frame's covariance (channels, size, size). */
+EXPORT void typical_start(TypicalError *typical, const double *covariance)
+{
+    int64_t square = typical->size * typical->size;
+    for (int64_t j = 0; j < typical->channels * square; j++)
+        typical->covariance[j] = 0.0;
+    for (int c = 0; c < typical->channels; c++)
+        average_channel(typical, c, covariance + c * square, 0.0, 1.0);
+    typical->weight = 1.0;
+}
+
+/* Takes in the frame's covariance (channels, size, size) dt [s] after the last one's; a less certain frame counts
+   less. */
+EXPORT void typical_average(TypicalError *typical, const double *covariance, double dt)
+{
+    double faded = typical->weight * exp(-dt / typical->memory_s), weight = 1.0 / uncertainty(typical);
+    typical->weight = faded + weight;
+    for (int c = 0; c < typical->channels; c++)
+        average_channel(typical, c, covariance + c * typical->size * typical->size, faded / typical->weight,
+                        weight / typical->weight);
 }
 
 /* Mean gain of one channel's shape for values of some variance. */
 static double shape_gain(const TypicalError *typical, int channel, const double *variance)
 {
     int n = (int)typical->size;
-    const double *measured = typical->variance + channel * n;
+    const double *measured = typical->frame->variance + channel * n;
     double sum = 0.0;
     for (int j = 1; j < n; j++)
         sum += variance[j] / (variance[j] + measured[j]);
@@ -80,13 +89,13 @@ static double shape_gain(const TypicalError *typical, int channel, const double 
 static HOT int factor_channel(const TypicalError *typical, int channel, const double *restrict frame, double gain)
 {
     int n = (int)typical->size, stride = row_length(n), at = channel * n;
-    Terms terms = terms_of(typical, channel);
+    Terms terms = terms_of(typical->frame, channel);
     double *restrict scale = typical->terms, *restrict slope = scale + n, *restrict arm = slope + n;
     double *restrict share = arm + n;
     const double *restrict typical_row = typical->covariance + (int64_t)at * n;
     float *restrict row = typical->factor;
     for (int j = 0; j < n; j++) {
-        double precision = sqrt((1.0 - gain) / typical->variance[at + j]);
+        double precision = sqrt((1.0 - gain) / typical->frame->variance[at + j]);
         scale[j] = terms.scale[j] * precision;
         slope[j] = terms.slope[j] * precision;
         arm[j] = terms.arm[j] * precision;
@@ -115,7 +124,7 @@ static double freedom(const TypicalError *typical, int channel, const double *va
     for (int j = 1; j < n; j++)
         known += variance[j] / usual[j];
     double excess = variance[0] - (n > 1 ? usual[0] * known / (n - 1) : variance[0]);
-    double free = excess / typical->variance[channel * n];
+    double free = excess / typical->frame->variance[channel * n];
     return free > least_freedom ? free : 0.0;
 }
 
@@ -125,7 +134,7 @@ static double level_shift(const TypicalError *typical, int channel, const double
                           const float *restrict level, float *restrict y)
 {
     int n = (int)typical->size;
-    const double *measured = typical->variance + channel * n;
+    const double *measured = typical->frame->variance + channel * n;
     double both = 0.0;
     for (int j = 1; j < n; j++)
         both += 1.0 + variance[j] / measured[j];
@@ -142,9 +151,9 @@ static void set_sides(const TypicalError *typical, int channel)
     int n = (int)typical->size, stride = row_length(n), at = channel * n;
     float *restrict side = typical->sides;
     for (int m = 0; m < typical->many; m++, side += stride) {
-        const double *restrict values = typical->memory_values[m] + at;
+        const double *restrict values = typical->memories[m]->values + at;
         for (int j = 0; j < n; j++)
-            side[j] = (float)((typical->values[at + j] - values[j]) / sqrt(typical->variance[at + j]));
+            side[j] = (float)((typical->frame->values[at + j] - values[j]) / sqrt(typical->frame->variance[at + j]));
         for (int j = n; j < stride; j++)
             side[j] = 0.0f;
     }
@@ -159,7 +168,7 @@ static HOT void weigh_channel(const TypicalError *typical, int channel, const do
                               double *restrict innovation)
 {
     int n = (int)typical->size, at = channel * n;
-    const double *restrict measured = typical->variance + at, *restrict usual = typical->diagonal + at;
+    const double *restrict measured = typical->frame->variance + at, *restrict usual = typical->diagonal + at;
     double shift = free > 0.0 ? level_shift(typical, channel, variance, free, level, y) : 0.0;
     double *restrict weight = typical->terms;
     for (int j = 0; j < n; j++)
@@ -181,7 +190,7 @@ static HOT void weigh_channel(const TypicalError *typical, int channel, const do
 static int decorrelate(const TypicalError *typical, int channel, const double *frame, int any_free)
 {
     int n = (int)typical->size, many = (int)typical->many;
-    double gain = shape_gain(typical, channel, typical->memory_variance[0] + channel * n);
+    double gain = shape_gain(typical, channel, typical->memories[0]->variance + channel * n);
     if (!factor_channel(typical, channel, frame + (int64_t)channel * n * n, gain))
         return 0;
     set_sides(typical, channel);
@@ -192,22 +201,24 @@ static int decorrelate(const TypicalError *typical, int channel, const double *f
 
 /* Innovations of all memories with a frame of covariance (channels, size, size), correlations and free levels being
    what they are. */
-EXPORT void weigh(const TypicalError *typical, const double *frame)
+EXPORT void typical_weigh(const TypicalError *typical, const double *frame)
 {
     int n = (int)typical->size, stride = row_length(n), many = (int)typical->many, any_free = 0;
     for (int c = 0; c < typical->channels; c++) {
         for (int m = 0; m < many; m++)
-            any_free |= freedom(typical, c, typical->memory_variance[m] + c * n) > 0.0;
+            any_free |= freedom(typical, c, typical->memories[m]->variance + c * n) > 0.0;
         int factored = decorrelate(typical, c, frame, any_free);
         for (int m = 0; m < many; m++) {
             double *innovation = typical->innovation + (m * typical->channels + c) * n;
-            const double *variance = typical->memory_variance[m] + c * n;
+            const double *variance = typical->memories[m]->variance + c * n;
             if (factored)
                 weigh_channel(typical, c, variance, freedom(typical, c, variance), typical->sides + many * stride,
                               typical->sides + m * stride, innovation);
             else
                 for (int j = 0; j < n; j++)
-                    innovation[j] = typical->values[c * n + j] - typical->memory_values[m][c * n + j];
+                    innovation[j] = typical->frame->values[c * n + j] - typical->memories[m]->values[c * n + j];
         }
     }
 }
+
+#endif
