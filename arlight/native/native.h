@@ -15,6 +15,9 @@
 #define HOT
 #endif
 
+/* For what hot loops call: left to itself the compiler may compile it once, for the plainest processor. */
+#define INLINE static inline __attribute__((always_inline))
+
 #define PI 3.14159265358979323846
 
 #endif

@@ -43,9 +43,7 @@ static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, Sums *su
     list_codes(b, 1, &span, values);
     list_codes(b, 2, &span, values + b->room);
     list_mean_luma(b, &span, values + 2 * b->room);
-    int steps = whole_steps(span.total);
-    for (int i = 0; i < steps; i++)
-        turn(c[i], &c[i], &s[i]);
+    turn_all(span.total, c, s);
     for (int k = 0; k < LISTS + 1; k++)
         clear_rest(list_of(b, k), span.total);
     int harmonics = b->harmonics[block] > 0;
@@ -88,7 +86,8 @@ static void expect(const Blocks *b, int block, Chroma *chroma)
 /* Fits some blocks' cells, of one number of harmonics. */
 static void fit_cells(const Blocks *b, const int32_t *order, int some, const Sums *sums, Chroma *chroma)
 {
-    SmallFits fits = {.rights = 3};
+    SmallFits fits;
+    fits.rights = 3;
     int harmonics = b->harmonics[order[0]] > 0;
     for (int l = 0; l < FITS; l++)
         fill_fit(&fits, l, harmonics, sums + (l < some ? l : 0));

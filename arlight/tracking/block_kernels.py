@@ -1,7 +1,6 @@
 """The compiled measuring of blocks (blocks.c) and the memory that it shares with Python."""
 
 import ctypes
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -19,6 +18,8 @@ from arlight.video.pixel_format import PixelFormat
 Array = NDArray[np.float64]
 
 _LANES, _STEP = 16, 8
+_LINE = 16
+"""Floats of a cache line."""
 _EDGES, _SURFACES, _CUBIC, _COLOUR = 8, 3, 4, 3 * (ROWS + 3)
 _LISTS = 12 + 16
 _SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
@@ -73,7 +74,7 @@ class BlockKernels:
         self._layout = layout
         n = -(-count // _LANES) * _LANES
         width, height = camera.image_size
-        room = (min(samples, width * height) + 3 * _STEP) // _STEP * _STEP
+        room = (min(samples, width * height) + 2 * _STEP + _LINE - 1) // _LINE * _LINE
         self.flags = np.zeros(n, np.uint8)
         self.pose = np.zeros(12)
         self.stripes = np.zeros((n, ROWS, 3))
@@ -90,7 +91,7 @@ class BlockKernels:
                 "sheet": _sheet(layout, n),
                 "flags": self.flags,
                 "pose": self.pose,
-                "seen": np.zeros(n, np.uint8),
+                "seen": np.zeros(n, np.int32),
                 "harmonics": self.harmonics,
                 "frequency": np.zeros((2, n), np.float32),
                 "margin": np.zeros((2, n), np.float32),
@@ -102,8 +103,8 @@ class BlockKernels:
                 "order": np.zeros(n, np.int32),
                 "spans": np.zeros((2, height), np.int32),
                 "rows": np.zeros((_SURFACES * _CUBIC, height), np.float32),
-                "places": np.zeros((3, room), np.int32),
-                "lists": np.zeros((_LISTS, room), np.float32),
+                "places": _aligned((3, room)).view(np.int32),
+                "lists": _aligned((_LISTS, room)),
                 "hue": self.hue,
                 "colour": np.zeros((n, _COLOUR), np.float32),
                 "mean_code": self.mean_code,
@@ -198,6 +199,13 @@ class BlockKernels:
         self._shared.samples = counts.ctypes.data + 8 * n
         self._shared.valid = valid.ctypes.data
         return results, counts, valid
+
+
+def _aligned(shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Zeros that begin with a cache line: vectors across two of them are read at half the speed."""
+    memory = np.zeros(shape[0] * shape[1] + _LINE, np.float32)
+    start = -(memory.ctypes.data // memory.itemsize) % _LINE
+    return memory[start : start + shape[0] * shape[1]].reshape(shape)
 
 
 def _sheet(layout: BlockLayout, n: int) -> NDArray[np.float32]:

@@ -7,18 +7,25 @@
 /* A block's pixels: lists of cos and sin of the phase, the place x, y, and CHANNELS lists of light, `room` apart. */
 typedef struct {
     int total;
+    int32_t largest[CHANNELS]; /* largest place in the decoding table */
     float *cosine, *sine, *x, *y, *light;
 } Pixels;
 
-/* Places in the decoding table of encoded RGB that follows from luma and phase. */
-static inline void colour_pixels(int harmonics, int total, const float *restrict tint, float last,
+INLINE int32_t place_of(float encoded, float last)
+{
+    float at = encoded * last + 0.5f;
+    at = at > 0.0f ? at : 0.0f;
+    return (int32_t)(at < last ? at : last);
+}
+
+/* Places in the decoding table of one encoded channel that follows from luma and phase. */
+INLINE void colour_pixels(int harmonics, int total, const float *restrict tint, float last,
                                  const float *restrict luma, const float *restrict c, const float *restrict s,
                                  int32_t *restrict places)
 {
     int steps = (total + STEP - 1) & -STEP;
     for (int i = 0; i < steps; i++) {
-        float series = tint[0], ck = c[i], sk = s[i];
-        float level = tint[ROWS] + tint[ROWS + 1] * ck + tint[ROWS + 2] * sk;
+        float ck = c[i], sk = s[i], series = tint[0], level = tint[ROWS] + tint[ROWS + 1] * ck + tint[ROWS + 2] * sk;
 #pragma GCC unroll 3
         for (int k = 1; k <= harmonics; k++) {
             series += tint[2 * k - 1] * ck + tint[2 * k] * sk;
@@ -26,70 +33,70 @@ static inline void colour_pixels(int harmonics, int total, const float *restrict
             sk = sk * c[i] + ck * s[i];
             ck = next;
         }
-        float encoded = (luma[i] * series + level) * last + 0.5f;
-        encoded = encoded > 0.0f ? encoded : 0.0f;
-        places[i] = (int32_t)(encoded < last ? encoded : last);
+        places[i] = place_of(luma[i] * series + level, last);
     }
 }
 
 /* The same of what three planes hold at full resolution. */
-static inline void mix_pixels(int total, const double *matrix, float last, const float *restrict first,
+INLINE void mix_pixels(int total, const double *matrix, float last, const float *restrict first,
                               const float *restrict second, const float *restrict third, int32_t *restrict places)
 {
     float by_first = (float)matrix[0], by_second = (float)matrix[1], by_third = (float)matrix[2];
     int steps = (total + STEP - 1) & -STEP;
-    for (int i = 0; i < steps; i++) {
-        float encoded = (by_first * first[i] + by_second * second[i] + by_third * third[i]) * last + 0.5f;
-        encoded = encoded > 0.0f ? encoded : 0.0f;
-        places[i] = (int32_t)(encoded < last ? encoded : last);
-    }
+    for (int i = 0; i < steps; i++)
+        places[i] = place_of(by_first * first[i] + by_second * second[i] + by_third * third[i], last);
 }
 
-/* Not vectorised: processors gather from tables more slowly than they read one entry after another. */
-static __attribute__((optimize("no-tree-vectorize"), noinline)) void look_up(const float *restrict table, int total,
-                                                                            const int32_t *restrict places,
-                                                                            float *restrict out)
+INLINE int32_t largest_place(int total, const int32_t *restrict places)
 {
+    int32_t most = 0;
     for (int i = 0; i < total; i++)
-        out[i] = table[places[i]];
+        most = places[i] > most ? places[i] : most;
+    return most;
 }
 
-/* Means of the channels and their largest values. */
-static HOT void mean_light(const Pixels *p, int64_t room, float mean[CHANNELS], float largest[CHANNELS])
+/* Reads two places at a time, one entry after another: processors gather from tables more slowly. */
+static void look_up(const float *restrict table, int total, const int32_t *restrict places, float *restrict out)
 {
-    for (int c = 0; c < CHANNELS; c++) {
-        const float *light = p->light + c * room;
-        float sum = 0.0f, most = 0.0f;
-        int steps = (p->total + STEP - 1) & -STEP;
-        for (int i = 0; i < steps; i++) {
-            sum += light[i];
-            most = light[i] > most ? light[i] : most;
-        }
-        mean[c] = p->total ? sum / (float)p->total : 0.0f;
-        largest[c] = most;
+    for (int i = 0; i < total; i += 4) {
+        uint64_t pair[2];
+        memcpy(pair, places + i, sizeof pair);
+        out[i] = table[(uint32_t)pair[0]];
+        out[i + 1] = table[pair[0] >> 32];
+        out[i + 2] = table[(uint32_t)pair[1]];
+        out[i + 3] = table[pair[1] >> 32];
     }
 }
 
-static HOT void light_places(const Blocks *b, int block, const Span *span, const Pixels *p)
+/* Mean light of a channel. */
+static HOT float mean_light(const Pixels *p, int64_t room, int channel)
+{
+    const float *light = p->light + channel * room;
+    float sum = 0.0f;
+    int steps = (p->total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++)
+        sum += light[i];
+    return p->total ? sum / (float)p->total : 0.0f;
+}
+
+/* Places in the decoding table of pixels' light. The lists of phase and codes are overwritten. */
+static HOT void find_places(const Blocks *b, int block, Pixels *p)
 {
     float last = (float)(b->entries - 1), *codes = p->light;
-    int shared = b->shift_x > 0 || b->shift_y > 0;
-    for (int plane = 0; plane < (shared ? 1 : 3); plane++)
-        list_codes(b, plane, span, codes + plane * b->room);
-    int steps = whole_steps(p->total), harmonics = hue_harmonics(b->harmonics[block]);
-    for (int i = 0; i < steps; i++)
-        turn(p->cosine[i], &p->cosine[i], &p->sine[i]);
+    int harmonics = hue_harmonics(b->harmonics[block]), total = p->total;
+    turn_all(total, p->cosine, p->sine);
     for (int c = 0; c < CHANNELS; c++) {
         const float *tint = b->colour + (int64_t)block * COLOUR + c * TINT;
         int32_t *places = b->places + c * b->room;
-        if (!shared)
-            mix_pixels(p->total, b->rgb_from_ycc + 3 * c, last, codes, codes + b->room, codes + 2 * b->room, places);
+        if (b->shift_x == 0 && b->shift_y == 0)
+            mix_pixels(total, b->rgb_from_ycc + 3 * c, last, codes, codes + b->room, codes + 2 * b->room, places);
         else if (harmonics == 0)
-            colour_pixels(0, p->total, tint, last, codes, p->cosine, p->sine, places);
+            colour_pixels(0, total, tint, last, codes, p->cosine, p->sine, places);
         else if (harmonics == 2)
-            colour_pixels(2, p->total, tint, last, codes, p->cosine, p->sine, places);
+            colour_pixels(2, total, tint, last, codes, p->cosine, p->sine, places);
         else
-            colour_pixels(3, p->total, tint, last, codes, p->cosine, p->sine, places);
+            colour_pixels(3, total, tint, last, codes, p->cosine, p->sine, places);
+        p->largest[c] = largest_place(total, places);
     }
 }
 
@@ -100,9 +107,12 @@ static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
     if (span.total > b->limit)
         thin_out(b, &span, (int)b->limit);
     list_points(b, block, grid, &span);
-    Pixels p = {span.total, list_of(b, PHASE_LIST), list_of(b, LISTS), list_of(b, X_LIST), list_of(b, Y_LIST),
+    Pixels p = {span.total, {0}, list_of(b, PHASE_LIST), list_of(b, LISTS), list_of(b, X_LIST), list_of(b, Y_LIST),
                 list_of(b, CODE_LIST)};
-    light_places(b, block, &span, &p);
+    int planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : 3;
+    for (int plane = 0; plane < planes; plane++)
+        list_codes(b, plane, &span, p.light + plane * b->room);
+    find_places(b, block, &p);
     for (int c = 0; c < CHANNELS; c++)
         look_up(b->light, p.total, b->places + c * b->room, p.light + c * b->room);
     for (int k = 0; k <= LISTS; k++)

@@ -22,12 +22,12 @@ typedef struct {
 /* Lists of pixels. */
 enum { PHASE_LIST, X_LIST, Y_LIST, CODE_LIST, LISTS = CODE_LIST + CHANNELS };
 
-static inline float *list_of(const Blocks *b, int which)
+INLINE float *list_of(const Blocks *b, int which)
 {
     return b->lists + which * b->room;
 }
 
-static inline int whole_steps(int count)
+INLINE int whole_steps(int count)
 {
     return (count + STEP - 1) & -STEP;
 }
@@ -149,6 +149,19 @@ static HOT void expand_rows(const Blocks *b, int block, const Grid *grid, const 
     }
 }
 
+/* A row's phase, x and y; k: its cubics; u: of its first cell, or of column 0 where columns are given. */
+INLINE void place_row(const float k[SURFACES * CUBIC], float u, float across, const int32_t *restrict columns,
+                             int count, float *restrict phase, float *restrict x, float *restrict y)
+{
+    int steps = (count + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++) {
+        float at = u + across * (columns ? (float)columns[i] : (float)i);
+        phase[i] = k[0] + at * (k[1] + at * (k[2] + at * k[3]));
+        x[i] = k[4] + at * (k[5] + at * (k[6] + at * k[7]));
+        y[i] = k[8] + at * (k[9] + at * (k[10] + at * k[11]));
+    }
+}
+
 /* Fills the lists of phase, x and y. */
 static HOT void list_points(const Blocks *b, int block, const Grid *grid, const Span *span)
 {
@@ -158,45 +171,53 @@ static HOT void list_points(const Blocks *b, int block, const Grid *grid, const 
     float *phase = list_of(b, PHASE_LIST), *x = list_of(b, X_LIST), *y = list_of(b, Y_LIST);
     const int32_t *columns = b->places;
     for (int r = 0; r < span->rows; r++) {
-        const float *terms = b->rows + r;
         float k[SURFACES * CUBIC];
         for (int i = 0; i < SURFACES * CUBIC; i++)
-            k[i] = terms[i * b->height];
-        int count = (span->count[r] + STEP - 1) & -STEP;
-        float start = left + across * (float)span->left[r];
-        for (int i = 0; i < count; i++) {
-            float u = span->sparse ? left + across * (float)columns[i] : start + across * (float)i;
-            phase[i] = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
-            x[i] = k[4] + u * (k[5] + u * (k[6] + u * k[7]));
-            y[i] = k[8] + u * (k[9] + u * (k[10] + u * k[11]));
-        }
-        phase += span->count[r], x += span->count[r], y += span->count[r], columns += span->count[r];
+            k[i] = b->rows[i * b->height + r];
+        int count = span->count[r];
+        if (span->sparse)
+            place_row(k, left, across, columns, count, phase, x, y);
+        else
+            place_row(k, left + across * (float)span->left[r], across, NULL, count, phase, x, y);
+        phase += count, x += count, y += count, columns += count;
     }
 }
 
-static inline void read_codes(const Blocks *b, int plane, int bytes, const Span *span, float *restrict out)
+INLINE float code_at(const char *row, int bytes, int64_t column)
 {
-    float offset = (float)b->offset[plane], scale = (float)b->scale[plane];
+    return bytes == 1 ? (float)((const uint8_t *)row)[column] : (float)((const uint16_t *)row)[column];
+}
+
+/* A row's values of a plane. end: of the plane; what lies before it is read in whole steps, and written over by the
+ * next row where it is too much. */
+INLINE void read_row(const char *row, int bytes, int left, const int32_t *restrict columns, int count,
+                            const char *end, float offset, float scale, float *restrict out)
+{
+    const char *from = row + (int64_t)left * bytes;
+    if (columns)
+        for (int i = 0; i < count; i++)
+            out[i] = scale * code_at(row, bytes, columns[i]) - offset;
+    else if (from + (int64_t)whole_steps(count) * bytes <= end) {
+        int steps = (count + STEP - 1) & -STEP;
+        for (int i = 0; i < steps; i++)
+            out[i] = scale * code_at(from, bytes, i) - offset;
+    } else
+        for (int i = 0; i < count; i++)
+            out[i] = scale * code_at(from, bytes, i) - offset;
+}
+
+INLINE void read_plane(const Blocks *b, int plane, int bytes, const Span *span, float *out)
+{
+    float scale = (float)b->scale[plane], offset = (float)(b->offset[plane] * b->scale[plane]);
     int64_t wide = plane ? (b->width + (1 << b->shift_x) - 1) >> b->shift_x : b->width;
     int64_t high = plane ? (b->height + (1 << b->shift_y) - 1) >> b->shift_y : b->height;
     const char *end = b->planes[plane] + (high - 1) * b->stride[plane] + wide * bytes;
+    const char *row = b->planes[plane] + span->first_row * b->stride[plane];
     const int32_t *columns = b->places;
-    for (int r = 0; r < span->rows; r++) {
-        const char *row = b->planes[plane] + (span->first_row + r) * b->stride[plane];
-        const char *from = row + (int64_t)span->left[r] * bytes;
+    for (int r = 0; r < span->rows; r++, row += b->stride[plane]) {
         int count = span->count[r];
-        if (span->sparse) {
-            for (int i = 0; i < count; i++)
-                out[i] = ((float)(bytes == 1 ? ((const uint8_t *)row)[columns[i]] : ((const uint16_t *)row)[columns[i]]) -
-                          offset) * scale;
-            columns += count;
-        } else {
-            /* whole steps; what is too much is written over by the next row */
-            int some = count && from + whole_steps(count) * bytes <= end ? whole_steps(count) : count;
-            for (int i = 0; i < some; i++)
-                out[i] = ((float)(bytes == 1 ? ((const uint8_t *)from)[i] : ((const uint16_t *)from)[i]) - offset) * scale;
-        }
-        out += count;
+        read_row(row, bytes, span->left[r], span->sparse ? columns : NULL, count, end, offset, scale, out);
+        out += count, columns += count;
     }
 }
 
@@ -204,58 +225,99 @@ static inline void read_codes(const Blocks *b, int plane, int bytes, const Span 
 static HOT void list_codes(const Blocks *b, int plane, const Span *span, float *out)
 {
     if (b->bytes == 1)
-        read_codes(b, plane, 1, span, out);
+        read_plane(b, plane, 1, span, out);
     else
-        read_codes(b, plane, 2, span, out);
+        read_plane(b, plane, 2, span, out);
 }
 
-static inline void read_luma(const Blocks *b, int bytes, const Span *span, float *restrict out)
+/* Two codes side by side. */
+typedef uint16_t Pair1 __attribute__((aligned(1), may_alias));
+typedef uint32_t Pair2 __attribute__((aligned(2), may_alias));
+
+/* Sum of the codes of a cell's part in one row; across: 1, 2 or 4 pixels. */
+INLINE int sum_across(const char *row, int bytes, int across, int64_t cell)
 {
-    int across = 1 << b->shift_x, down = 1 << b->shift_y;
-    float offset = (float)b->offset[0], scale = (float)b->scale[0] / (float)(across * down);
+    if (across == 1)
+        return bytes == 1 ? ((const uint8_t *)row)[cell] : ((const uint16_t *)row)[cell];
+    int sum = 0;
+    for (int k = 0; k < across / 2; k++) {
+        int64_t at = across / 2 * cell + k;
+        if (bytes == 1)
+            sum += (((const Pair1 *)row)[at] & 255) + (((const Pair1 *)row)[at] >> 8);
+        else
+            sum += (int)(((const Pair2 *)row)[at] & 65535) + (int)(((const Pair2 *)row)[at] >> 16);
+    }
+    return sum;
+}
+
+/* A row's mean luma over cells of pixels. */
+INLINE void average_row(const char *row, int64_t stride, int bytes, int across, int down,
+                               const int32_t *restrict columns, int count, float offset, float scale,
+                               float *restrict out)
+{
+    for (int i = 0; i < count; i++) {
+        int64_t cell = columns ? columns[i] : i;
+        int sum = sum_across(row, bytes, across, cell);
+        for (int j = 1; j < down; j++)
+            sum += sum_across(row + j * stride, bytes, across, cell);
+        out[i] = scale * (float)sum - offset;
+    }
+}
+
+INLINE void average_plane(const Blocks *b, int bytes, int across, int down, const Span *span, float *out)
+{
+    float scale = (float)b->scale[0] / (float)(across * down), offset = (float)(b->offset[0] * b->scale[0]);
+    int64_t stride = b->stride[0];
+    const char *row = b->planes[0] + (int64_t)span->first_row * down * stride;
     const int32_t *columns = b->places;
-    for (int r = 0; r < span->rows; r++) {
+    for (int r = 0; r < span->rows; r++, row += down * stride) {
         int count = span->count[r];
-        for (int i = 0; i < count; i++)
-            out[i] = -offset * (float)(across * down);
-        for (int j = 0; j < down; j++) {
-            const char *row = b->planes[0] + (((int64_t)(span->first_row + r) << b->shift_y) + j) * b->stride[0];
-            for (int k = 0; k < across; k++)
-                for (int i = 0; i < count; i++) {
-                    int column = (span->sparse ? columns[i] : span->left[r] + i) * across + k;
-                    out[i] += (float)(bytes == 1 ? ((const uint8_t *)row)[column] : ((const uint16_t *)row)[column]);
-                }
-        }
-        for (int i = 0; i < count; i++)
-            out[i] *= scale;
+        const char *from = row + (int64_t)span->left[r] * across * bytes;
+        if (span->sparse)
+            average_row(row, stride, bytes, across, down, columns, count, offset, scale, out);
+        else
+            average_row(from, stride, bytes, across, down, NULL, count, offset, scale, out);
         out += count, columns += count;
     }
 }
 
-/* Fills a list with the mean luma of cells. */
+/* Fills a list with the mean luma of cells. The usual ones have loops of their own. */
 static HOT void list_mean_luma(const Blocks *b, const Span *span, float *out)
 {
-    if (b->bytes == 1)
-        read_luma(b, 1, span, out);
+    int across = 1 << b->shift_x, down = 1 << b->shift_y;
+    if (b->bytes == 1 && across == 2 && down == 2)
+        average_plane(b, 1, 2, 2, span, out);
+    else if (b->bytes == 1)
+        average_plane(b, 1, across, down, span, out);
+    else if (across == 2 && down == 2)
+        average_plane(b, 2, 2, 2, span, out);
     else
-        read_luma(b, 2, span, out);
+        average_plane(b, 2, across, down, span, out);
 }
 
 /* Clears what stands behind the list up to a whole step. */
-static inline void clear_rest(float *list, int total)
+INLINE void clear_rest(float *list, int total)
 {
     for (int i = total; i < whole_steps(total); i++)
         list[i] = 0.0f;
 }
 
 /* cos and sin of the phase [cycles], to 1e-5, in place of phase and in `sine`. */
-static inline void turn(float cycles, float *cosine, float *sine)
+INLINE void turn(float cycles, float *cosine, float *sine)
 {
     float t = cycles - __builtin_rintf(cycles), square = t * t;
     float twice = t * (6.28316404f + square * (-10.33428559f + square * (5.08379806f - 1.10927239f * square)));
     float half = 0.9999933f + square * (-4.93393801f + square * (4.04128377f - 1.22212693f * square));
     *cosine = 1.0f - 0.5f * twice * twice;
     *sine = twice * half;
+}
+
+/* Replaces a list of phases by their cosines, and fills that of sines. */
+INLINE void turn_all(int total, float *restrict phase, float *restrict sine)
+{
+    int steps = (total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++)
+        turn(phase[i], &phase[i], &sine[i]);
 }
 
 #endif

@@ -5,8 +5,17 @@
 #include "blocks.h"
 #include "small_fit.h"
 
+/* How many of the blocks from `at` on have one number of harmonics, FITS at most. */
+static int alike(const Blocks *b, int at, int count)
+{
+    int some = 1;
+    while (some < FITS && at + some < count && b->harmonics[b->order[at + some]] == b->harmonics[b->order[at]])
+        some++;
+    return some;
+}
+
 /* What geometry alone decides. c, s, x, y: lists of cos and sin of the phase and the place, zero behind the total. */
-static inline void sum_places(int harmonics, int total, const float *restrict c, const float *restrict s,
+INLINE void sum_places(int harmonics, int total, const float *restrict c, const float *restrict s,
                               const float *restrict x, const float *restrict y, Sums *sums)
 {
     float cosine[2 * HARMONICS + 1] = {0}, sine[2 * HARMONICS + 1] = {0};
@@ -38,7 +47,7 @@ static inline void sum_places(int harmonics, int total, const float *restrict c,
 }
 
 /* One channel's values times the columns. */
-static inline void sum_values(int harmonics, int total, const float *restrict c, const float *restrict s,
+INLINE void sum_values(int harmonics, int total, const float *restrict c, const float *restrict s,
                               const float *restrict x, const float *restrict y, const float *restrict values,
                               float right[ROWS + 2], float *squares)
 {
@@ -63,7 +72,7 @@ static inline void sum_values(int harmonics, int total, const float *restrict c,
     *squares = square;
 }
 
-static inline void sum_all(int harmonics, int total, const float *c, const float *s, const float *x, const float *y,
+INLINE void sum_all(int harmonics, int total, const float *c, const float *s, const float *x, const float *y,
                            const float *values, int64_t room, Sums *sums)
 {
     sum_places(harmonics, total, c, s, x, y, sums);

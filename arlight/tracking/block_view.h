@@ -38,7 +38,7 @@ static Eye eye_of(const Blocks *b)
 }
 
 /* Pixel and depth [mm] of a point of the film. */
-static inline void look_at(const Eye *eye, float x, float y, float *px, float *py, float *depth)
+INLINE void look_at(const Eye *eye, float x, float y, float *px, float *py, float *depth)
 {
     const float *r = eye->rotation, *t = eye->translation;
     float along = r[6] * x + r[7] * y + t[2], near = 1.0f / along;
@@ -47,7 +47,7 @@ static inline void look_at(const Eye *eye, float x, float y, float *px, float *p
 }
 
 /* How far aside of its film point (x, y) the paper is seen, per component toward the camera; the view's cosine. */
-static inline float parallax(const Eye *eye, float x, float y, float *cosine)
+INLINE float parallax(const Eye *eye, float x, float y, float *cosine)
 {
     float vx = eye->centre[0] - x, vy = eye->centre[1] - y, across = vx * vx + vy * vy;
     float total = across + eye->centre[2] * eye->centre[2];
@@ -56,7 +56,7 @@ static inline float parallax(const Eye *eye, float x, float y, float *cosine)
 }
 
 /* The film point through which a point (x, y) of the paper is seen. */
-static inline void film_over(const Eye *eye, float x, float y, float *film_x, float *film_y)
+INLINE void film_over(const Eye *eye, float x, float y, float *film_x, float *film_y)
 {
     float cosine, at_x = x, at_y = y;
     for (int k = 0; k < 3; k++) {
@@ -70,35 +70,19 @@ static inline void film_over(const Eye *eye, float x, float y, float *film_x, fl
 
 static const float CORNER_X[4] = {-1, 1, 1, -1}, CORNER_Y[4] = {-1, -1, 1, 1};
 
-/* Where blocks lie: box, frequency, margin, gain; seen where every corner is in front of the camera. */
-static HOT void place_blocks(const Blocks *b, const Eye *from, int first)
+/* The part of each block's bounding box that is in the picture, and the vignetting in its middle; corners: 1 to 4. */
+INLINE void frame_blocks(const Blocks *b, int first, const Lane *px, const Lane *py, const Lane *depth)
 {
-    const Eye eye = *from;
     int64_t n = b->blocks;
-    const float *s = b->sheet + first, edge = (float)b->edge_px;
-    Lane px[5], py[5], depth[5];
-    for (int k = 0; k < 5; k++) {
-        float u = k ? CORNER_X[k - 1] : 0.0f, v = k ? CORNER_Y[k - 1] : 0.0f;
-        EACH_LANE look_at(&eye, s[l] + u * s[2 * n + l], s[n + l] + v * s[2 * n + l], &px[k][l], &py[k][l],
-                          &depth[k][l]);
-    }
-    float right = (float)(b->width - 1), bottom = (float)(b->height - 1), diagonal = (float)b->half_diagonal_px;
+    float *box = b->box + first, *gain = b->gain + first, diagonal = 1.0f / (float)b->half_diagonal_px;
+    float right = (float)(b->width - 1), bottom = (float)(b->height - 1);
+    float centre_x = (float)b->lens[2], centre_y = (float)b->lens[3];
     float k1 = (float)b->vignetting[0], k2 = (float)b->vignetting[1], k3 = (float)b->vignetting[2];
+    int32_t *seen = b->seen + first;
     EACH_LANE
     {
-        int at = first + l;
-        float side = 4.0f * s[2 * n + l];
-        float xx = (px[2][l] + px[3][l] - px[1][l] - px[4][l]) / side;
-        float yx = (py[2][l] + py[3][l] - py[1][l] - py[4][l]) / side;
-        float xy = (px[3][l] + px[4][l] - px[1][l] - px[2][l]) / side;
-        float yy = (py[3][l] + py[4][l] - py[1][l] - py[2][l]) / side;
-        float determinant = xx * yy - xy * yx, over = 1.0f / determinant;
-        b->frequency[at] = (yy * s[3 * n + l] - yx * s[4 * n + l]) * over;
-        b->frequency[n + at] = (xx * s[4 * n + l] - xy * s[3 * n + l]) * over;
-        b->margin[at] = edge * sqrtf(yy * yy + xy * xy) * fabsf(over);
-        b->margin[n + at] = edge * sqrtf(xx * xx + yx * yx) * fabsf(over);
-        float left = px[0][l], top = py[0][l], last_x = left, last_y = top, nearest = depth[0][l];
-        for (int k = 1; k < 5; k++) {
+        float left = px[1][l], top = py[1][l], last_x = left, last_y = top, nearest = depth[1][l];
+        for (int k = 2; k < 5; k++) {
             left = px[k][l] < left ? px[k][l] : left;
             top = py[k][l] < top ? py[k][l] : top;
             last_x = px[k][l] > last_x ? px[k][l] : last_x;
@@ -109,19 +93,57 @@ static HOT void place_blocks(const Blocks *b, const Eye *from, int first)
         top = top > 0.0f ? top : 0.0f;
         last_x = last_x < right ? last_x : right;
         last_y = last_y < bottom ? last_y : bottom;
-        b->box[at] = 0.5f * (left + last_x);
-        b->box[n + at] = 0.5f * (top + last_y);
-        b->box[2 * n + at] = 0.5f * (last_x - left);
-        b->box[3 * n + at] = 0.5f * (last_y - top);
-        b->seen[at] = (last_x > left) & (last_y > top) & (nearest > 0.0f) & (fabsf(determinant) > 1e-6f);
-        float away_x = (px[0][l] - eye.lens.centre_x) / diagonal, away_y = (py[0][l] - eye.lens.centre_y) / diagonal;
-        float squared = away_x * away_x + away_y * away_y;
-        b->gain[at] = 1.0f + squared * (k1 + squared * (k2 + squared * k3));
+        box[l] = 0.5f * (left + last_x);
+        box[n + l] = 0.5f * (top + last_y);
+        box[2 * n + l] = 0.5f * (last_x - left);
+        box[3 * n + l] = 0.5f * (last_y - top);
+        seen[l] = (last_x > left) & (last_y > top) & (nearest > 0.0f);
+        float x = (px[0][l] - centre_x) * diagonal, y = (py[0][l] - centre_y) * diagonal, squared = x * x + y * y;
+        gain[l] = 1.0f + squared * (k1 + squared * (k2 + squared * k3));
     }
 }
 
+/* The pattern's frequency in the picture, and the margin on the sheet, from the corners' central differences. */
+INLINE void measure_slopes(const Blocks *b, int first, const Lane *px, const Lane *py)
+{
+    int64_t n = b->blocks;
+    const float *s = b->sheet + first;
+    float *frequency = b->frequency + first, *margin = b->margin + first, edge = (float)b->edge_px;
+    int32_t *seen = b->seen + first;
+    EACH_LANE
+    {
+        float side = 0.25f / s[2 * n + l], u = s[3 * n + l], v = s[4 * n + l];
+        float xx = side * (px[2][l] + px[3][l] - px[1][l] - px[4][l]);
+        float yx = side * (py[2][l] + py[3][l] - py[1][l] - py[4][l]);
+        float xy = side * (px[3][l] + px[4][l] - px[1][l] - px[2][l]);
+        float yy = side * (py[3][l] + py[4][l] - py[1][l] - py[2][l]);
+        float determinant = xx * yy - xy * yx, over = 1.0f / determinant, size = over < 0.0f ? -edge * over : edge * over;
+        frequency[l] = (yy * u - yx * v) * over;
+        frequency[n + l] = (xx * v - xy * u) * over;
+        margin[l] = size * sqrtf(yy * yy + xy * xy);
+        margin[n + l] = size * sqrtf(xx * xx + yx * yx);
+        seen[l] &= (determinant > 1e-6f) | (determinant < -1e-6f);
+    }
+}
+
+/* Where blocks lie; seen are those whose every corner is in front of the camera. */
+static HOT void place_blocks(const Blocks *b, const Eye *from, int first)
+{
+    const Eye eye = *from;
+    int64_t n = b->blocks;
+    const float *s = b->sheet + first;
+    Lane px[5], py[5], depth[5];
+    for (int k = 0; k < 5; k++) {
+        float u = k ? CORNER_X[k - 1] : 0.0f, v = k ? CORNER_Y[k - 1] : 0.0f;
+        EACH_LANE look_at(&eye, s[l] + u * s[2 * n + l], s[n + l] + v * s[2 * n + l], &px[k][l], &py[k][l],
+                          &depth[k][l]);
+    }
+    frame_blocks(b, first, px, py, depth);
+    measure_slopes(b, first, px, py);
+}
+
 /* One straight edge after another of a window whose corners are given, from its box's middle. */
-static inline void draw_edges(const Blocks *b, int first, const Lane *px, const Lane *py, float *edges)
+INLINE void draw_edges(const Blocks *b, int first, const Lane *px, const Lane *py, float *edges)
 {
     int64_t n = b->blocks;
     for (int k = 0; k < 4; k++) {
@@ -148,19 +170,27 @@ static HOT void cut_windows(const Blocks *b, const Eye *from, int first)
     const Eye eye = *from;
     int64_t n = b->blocks;
     const float *s = b->sheet + first, reach = (float)b->reach_mm;
-    Lane px[4], py[4], depth;
+    int32_t *seen = b->seen + first;
     for (int paper = 0; paper < 2; paper++) {
-        for (int k = 0; k < 4; k++)
+        Lane px[4], py[4], depth, room_x, room_y;
+        const float *margin = b->margin + first;
+        EACH_LANE
+        {
+            room_x[l] = s[2 * n + l] - (paper ? reach : margin[l]);
+            room_y[l] = s[2 * n + l] - (paper ? reach : margin[n + l]);
+            seen[l] &= (room_x[l] > 0.0f) & (room_y[l] > 0.0f);
+        }
+        for (int k = 0; k < 4; k++) {
             EACH_LANE
             {
-                float half = s[2 * n + l];
-                float room_x = half - (paper ? reach : b->margin[first + l]);
-                float room_y = half - (paper ? reach : b->margin[n + first + l]);
-                float x = s[l] + CORNER_X[k] * room_x, y = s[n + l] + CORNER_Y[k] * room_y, film_x, film_y;
+                float x = s[l] + CORNER_X[k] * room_x[l], y = s[n + l] + CORNER_Y[k] * room_y[l], film_x, film_y;
                 film_over(&eye, x, y, &film_x, &film_y);
-                look_at(&eye, paper ? film_x : x, paper ? film_y : y, &px[k][l], &py[k][l], &depth[l]);
-                b->seen[first + l] &= (room_x > 0.0f) & (room_y > 0.0f) & (depth[l] > 0.0f);
+                film_x = paper ? film_x : x;
+                film_y = paper ? film_y : y;
+                look_at(&eye, film_x, film_y, &px[k][l], &py[k][l], &depth[l]);
             }
+            EACH_LANE seen[l] &= depth[l] > 0.0f;
+        }
         draw_edges(b, first, px, py, b->edges + paper * 4 * 3 * n + first);
     }
 }
@@ -175,7 +205,7 @@ static const float OF_NODES[CUBIC][CUBIC] = {
 };
 
 /* Rays (NODES) of the nodes of each block's box. */
-static inline void cast_rays(const Blocks *b, const Eye *eye, int first, Lane *x, Lane *y)
+INLINE void cast_rays(const Blocks *b, const Eye *eye, int first, Lane *x, Lane *y)
 {
     int64_t n = b->blocks;
     for (int k = 0; k < NODES; k++) {
@@ -194,7 +224,7 @@ static inline void cast_rays(const Blocks *b, const Eye *eye, int first, Lane *x
 }
 
 /* Replaces rays by the film's phase and the places in the paper's window that they meet. */
-static inline void meet_sheet(const Blocks *b, const Eye *eye, int first, Lane *x, Lane *y, Lane *phase)
+INLINE void meet_sheet(const Blocks *b, const Eye *eye, int first, Lane *x, Lane *y, Lane *phase)
 {
     int64_t n = b->blocks;
     const float *s = b->sheet + first, *r = eye->rotation, reach = (float)b->reach_mm;

@@ -27,15 +27,6 @@ static int put_in_order(const Blocks *b, int *whites)
     return count;
 }
 
-/* How many of the blocks from `at` on have one number of harmonics, FITS at most. */
-static int alike(const Blocks *b, int at, int count)
-{
-    int some = 1;
-    while (some < FITS && at + some < count && b->harmonics[b->order[at + some]] == b->harmonics[b->order[at]])
-        some++;
-    return some;
-}
-
 /* Reads the cells of all blocks; chroma: by place in the order. */
 static void read_chroma(const Blocks *b, int count, Chroma *chroma)
 {
@@ -92,20 +83,24 @@ static float white_level(const float (*mean)[CHANNELS], int whites, int channel)
     return count == 0 ? 0.0f : values[below] + (at - (float)below) * (values[below + (below + 1 < count)] - values[below]);
 }
 
-/* Lists a block's pixels without those that show a lamp; level: of white, 0 where it is not known. */
-static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const float level[CHANNELS], float mean[CHANNELS])
+/* Lists a block's pixels without those that show a lamp. level: of white, 0 where it is not known; mean: of all the
+ * pixels, where it is asked for. */
+static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const float level[CHANNELS], float *mean)
 {
     int block = b->order[at], over = 0;
     Pixels p = light_pixels(b, block, grid);
-    float largest[CHANNELS], ceiling[CHANNELS];
-    mean_light(&p, b->room, mean, largest);
+    float ceiling[CHANNELS];
     b->gathered[block] = p.total;
     for (int c = 0; c < CHANNELS; c++) {
-        /* an evenly bright mirror image, the sky's at grazing view, lifts its block's stripes and hides none */
-        float lifted = (float)fmax(BRIGHTEST_STRIPE * level[c], LAMP_OVER_AVERAGE * mean[c]);
+        if (mean)
+            mean[c] = mean_light(&p, b->room, c);
         int known = level[c] > 0.0f && !(b->flags[block] & WHITE);
-        ceiling[c] = known && lifted < b->clip ? lifted : (float)b->clip;
-        over |= largest[c] > ceiling[c];
+        float largest = b->light[p.largest[c]], lifted = (float)BRIGHTEST_STRIPE * level[c];
+        /* an evenly bright mirror image, the sky's at grazing view, lifts its block's stripes and hides none */
+        if (known && largest > lifted)
+            lifted = fmaxf(lifted, (float)LAMP_OVER_AVERAGE * mean_light(&p, b->room, c));
+        ceiling[c] = known && lifted < (float)b->clip ? lifted : (float)b->clip;
+        over |= largest > ceiling[c];
     }
     if (over)
         leave_out(&p, b->room, ceiling);
@@ -116,7 +111,7 @@ static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const flo
 static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANNELS])
 {
     Grid grid = grid_of(b, 0);
-    float mean[MOST_WHITES][CHANNELS], own[CHANNELS];
+    float mean[MOST_WHITES][CHANNELS];
     int known = 0;
     for (int c = 0; c < CHANNELS; c++)
         level[c] = 0.0f;
@@ -124,10 +119,10 @@ static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANN
         if (at == whites)
             for (int c = 0; c < CHANNELS; c++)
                 level[c] = white_level((const float(*)[CHANNELS])mean, known, c);
-        Pixels p = usable_pixels(b, at, &grid, level, own);
+        int white = at < whites && known < MOST_WHITES;
+        Pixels p = usable_pixels(b, at, &grid, level, white ? mean[known] : NULL);
         sum_block(b->harmonics[b->order[at]], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, b->sums + at);
-        if (at < whites && b->gathered[b->order[at]] >= LEAST_SAMPLES && known < MOST_WHITES)
-            memcpy(mean[known++], own, sizeof own);
+        known += white && b->gathered[b->order[at]] >= LEAST_SAMPLES;
     }
 }
 
@@ -161,7 +156,8 @@ static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *ord
 
 static void fit_blocks(const Blocks *b, int count)
 {
-    SmallFits fits = {.rights = CHANNELS};
+    SmallFits fits;
+    fits.rights = CHANNELS;
     for (int at = 0, some; at < count; at += some) {
         int used[FITS];
         float squares[FITS][CHANNELS];
@@ -219,13 +215,14 @@ static HOT void fill_cubic(SmallFits *f, int l, int harmonics, Pixels *p, int64_
 /* Blocks that mirror a lamp in the film are fitted once more with a shading of third degree. */
 static void fit_lamps(const Blocks *b, const int32_t *order, int some, const float level[CHANNELS])
 {
-    SmallFits fits = {.rights = CHANNELS};
+    SmallFits fits;
+    fits.rights = CHANNELS;
     Grid grid = grid_of(b, 0);
     int used[FITS];
-    float squares[FITS][CHANNELS], mean[CHANNELS];
+    float squares[FITS][CHANNELS];
     for (int l = 0; l < FITS; l++) {
         int at = l < some ? l : 0;
-        Pixels p = usable_pixels(b, order[at], &grid, level, mean);
+        Pixels p = usable_pixels(b, order[at], &grid, level, NULL);
         fill_cubic(&fits, l, b->harmonics[b->order[order[at]]], &p, b->room, list_of(b, 12), squares[l]);
         used[l] = p.total;
     }

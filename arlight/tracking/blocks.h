@@ -37,7 +37,7 @@ typedef struct {
     const double *pose;               /* (12) rotation row by row, translation [mm] */
     double edge_px;                   /* to keep from a block's border */
 
-    uint8_t *seen;      /* (n) the block lies in the picture, in front of the camera */
+    int32_t *seen;      /* (n) the block lies in the picture, in front of the camera */
     int32_t *harmonics; /* (n) that the pixels can separate */
     float *frequency;   /* (2, n) of the pattern in the picture, x and y [1/px] */
     float *margin;      /* (2, n) to keep from the block's border, along x and y [mm] */

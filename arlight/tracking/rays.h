@@ -3,9 +3,10 @@
 #define ARLIGHT_RAYS_H
 
 #include "lens.h"
+#include "native.h"
 
 /* Bent normalised coordinates of a pixel: the sensor's tilt undone. upright: (9) inverse of the tilt. */
-static inline void untilted(const Lens *lens, const float *upright, float px, float py, float *x, float *y)
+INLINE void untilted(const Lens *lens, const float *upright, float px, float py, float *x, float *y)
 {
     float u = (px - lens->centre_x) / lens->focal_x, v = (py - lens->centre_y) / lens->focal_y;
     float scale = 1.0f / (upright[6] * u + upright[7] * v + upright[8]);
@@ -14,7 +15,7 @@ static inline void untilted(const Lens *lens, const float *upright, float px, fl
 }
 
 /* One round of undoing the distortion: bent (u, v), and the guess (x, y) that it improves. */
-static inline void straighten(const Lens *lens, float u, float v, float *x, float *y)
+INLINE void straighten(const Lens *lens, float u, float v, float *x, float *y)
 {
     float r2 = *x * *x + *y * *y, twist = 2.0f * *x * *y;
     float radial = 1.0f + r2 * (lens->k4 + r2 * (lens->k5 + r2 * lens->k6));

@@ -1,82 +1,84 @@
-/* Small least squares, several at a time. */
+/* Small least squares, FITS at a time: one in each lane of a vector. */
 #ifndef ARLIGHT_SMALL_FIT_H
 #define ARLIGHT_SMALL_FIT_H
 
 #include "native.h"
 
-#define FITS 8      /* fits that are solved together */
-#define COLUMNS 16  /* at most */
-#define RIGHTS 3    /* at most */
-#define EACH_FIT for (int l = 0; l < FITS; l++)
-#define SINGULAR 1e-6 /* of a column's square: what the columns before it may leave of it */
+#define FITS 8
+#define COLUMNS 16 /* at most */
+#define RIGHTS 3   /* at most */
+#define SINGULAR 1e-6 /* of a column's square: least that the columns before it must leave of it */
 
-typedef double Fits[FITS];
+typedef double Fits __attribute__((vector_size(FITS * sizeof(double))));
 
 typedef struct {
     int columns, rights;
-    Fits normal[COLUMNS][COLUMNS]; /* lower triangle */
+    Fits normal[COLUMNS][COLUMNS];  /* lower triangle; overwritten */
     Fits right[RIGHTS][COLUMNS];
-    Fits inverse[COLUMNS][COLUMNS]; /* of the normal matrix; lower triangle */
+    Fits inverse[COLUMNS][COLUMNS]; /* of the normal matrix, lower triangle */
     Fits solved[RIGHTS][COLUMNS];
-    Fits explained[RIGHTS];        /* right' solved: the part of the squares that the fit takes */
-    Fits regular;                  /* 1 where the columns can be told from each other, else 0 */
+    Fits explained[RIGHTS];         /* right' solved: the part of the squares that the fit takes */
+    double regular[FITS];           /* 1 where the columns can be told from each other, else 0 */
 } SmallFits;
 
-/* Replaces the normal matrices by the inverses of their Cholesky factors. */
-static inline void invert_factors(SmallFits *f)
+/* Replaces the normal matrices by their Cholesky factors, the diagonal by its reciprocal. */
+INLINE void factorise_fits(SmallFits *f)
 {
-    EACH_FIT f->regular[l] = 1.0;
-    for (int i = 0; i < f->columns; i++) {
+    for (int l = 0; l < FITS; l++)
+        f->regular[l] = 1.0;
+    for (int i = 0; i < f->columns; i++)
         for (int j = 0; j <= i; j++) {
-            Fits rest;
-            EACH_FIT rest[l] = f->normal[i][j][l];
+            Fits rest = f->normal[i][j];
             for (int k = 0; k < j; k++)
-                EACH_FIT rest[l] -= f->normal[i][k][l] * f->normal[j][k][l];
-            if (j < i)
-                EACH_FIT f->normal[i][j][l] = rest[l] * f->normal[j][j][l];
-            else
-                EACH_FIT
-                {
-                    int good = (rest[l] > SINGULAR * f->normal[i][i][l]) & (rest[l] > 0.0);
-                    f->regular[l] = good ? f->regular[l] : 0.0;
-                    f->normal[i][i][l] = 1.0 / sqrt(good ? rest[l] : 1.0);
-                }
+                rest -= f->normal[i][k] * f->normal[j][k];
+            if (j < i) {
+                f->normal[i][j] = rest * f->normal[j][j];
+                continue;
+            }
+            Fits own = f->normal[i][i];
+            for (int l = 0; l < FITS; l++) {
+                int good = rest[l] > SINGULAR * own[l] && rest[l] > 0.0;
+                f->regular[l] = good ? f->regular[l] : 0.0;
+                own[l] = good ? rest[l] : 1.0;
+            }
+            for (int l = 0; l < FITS; l++)
+                own[l] = 1.0 / sqrt(own[l]);
+            f->normal[i][i] = own;
         }
-    }
-    /* the diagonal holds reciprocals; below it the factor becomes its own inverse */
+}
+
+/* Replaces the factors by their inverses. */
+INLINE void invert_factors(SmallFits *f)
+{
     for (int j = 0; j < f->columns; j++)
         for (int i = j + 1; i < f->columns; i++) {
-            Fits sum = {0.0};
-            for (int k = j; k < i; k++)
-                EACH_FIT sum[l] += f->normal[i][k][l] * f->normal[k][j][l];
-            EACH_FIT f->normal[i][j][l] = -sum[l] * f->normal[i][i][l];
+            Fits sum = f->normal[i][j] * f->normal[j][j];
+            for (int k = j + 1; k < i; k++)
+                sum += f->normal[i][k] * f->normal[k][j];
+            f->normal[i][j] = -sum * f->normal[i][i];
         }
 }
 
 /* Solves all fits. */
 static HOT void solve_fits(SmallFits *f)
 {
+    factorise_fits(f);
     invert_factors(f);
     for (int i = 0; i < f->columns; i++)
         for (int j = 0; j <= i; j++) {
-            Fits sum = {0.0};
-            for (int k = i; k < f->columns; k++)
-                EACH_FIT sum[l] += f->normal[k][i][l] * f->normal[k][j][l];
-            EACH_FIT f->inverse[i][j][l] = sum[l];
+            Fits sum = f->normal[i][i] * f->normal[i][j];
+            for (int k = i + 1; k < f->columns; k++)
+                sum += f->normal[k][i] * f->normal[k][j];
+            f->inverse[i][j] = sum;
         }
     for (int c = 0; c < f->rights; c++) {
-        EACH_FIT f->explained[c][l] = 0.0;
+        f->explained[c] = 0.0 * f->right[c][0];
         for (int i = 0; i < f->columns; i++) {
-            Fits sum = {0.0};
-            for (int j = 0; j < f->columns; j++) {
-                const double *of = i > j ? f->inverse[i][j] : f->inverse[j][i];
-                EACH_FIT sum[l] += of[l] * f->right[c][j][l];
-            }
-            EACH_FIT
-            {
-                f->solved[c][i][l] = sum[l];
-                f->explained[c][l] += sum[l] * f->right[c][i][l];
-            }
+            Fits sum = f->inverse[i][0] * f->right[c][0];
+            for (int j = 1; j < f->columns; j++)
+                sum += (i > j ? f->inverse[i][j] : f->inverse[j][i]) * f->right[c][j];
+            f->solved[c][i] = sum;
+            f->explained[c] += sum * f->right[c][i];
         }
     }
 }
