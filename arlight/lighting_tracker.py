@@ -3,21 +3,24 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from arlight.calibration.camera.exposure import ExposureMeter
 from arlight.camera import Camera
 from arlight.errors import ProbeError
-from arlight.estimation.estimator import Estimate, LightingEstimator
+from arlight.estimation.estimator import ITERATIONS, Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.nuisance import Nuisance
-from arlight.fourier import orders_up_to
+from arlight.estimation.order_choice import Need, OrderChoice
+from arlight.fourier import frequency_order, orders_up_to
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
+from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import BlockMeans
 from arlight.tracking.blocks import BlockMeter
 from arlight.tracking.luma import luma_plane
@@ -31,6 +34,8 @@ _LEVEL_DEVIATION = 0.005
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
+Order = int | Literal["auto"]
+
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
@@ -40,13 +45,17 @@ class TrackerSettings:
     """Pixels a block is sampled with at most."""
     alignment_levels: int = 1
     """Levels of resolution that the pose is aligned on, 1 to 4; coarser ones are always there to fall back on."""
+    iterations: int = ITERATIONS
+    """How often weights and solution are refined in a frame."""
+    estimate_every: int = 1
+    """The light is measured in every n-th frame that shows the sheet, and predicted in those between."""
+    order: Order = "auto"
+    """Highest order of the light that is measured, from 0 to the sheet's; `auto` goes by what the data support and the
+    object shows. Blocks of higher orders are not looked at."""
     filtered: bool = True
     """Average over time; without it every frame stands alone."""
     bounces: bool = True
     """Model the light reflected between paper and glass; off only for sheets without it."""
-    order: int | None = None
-    """Highest order of the lighting that is told; the sheet's by default. What lies beyond is still fitted, so that it
-    does not pass for light of a lower order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +82,10 @@ class FrameEstimate:
 class BlockEstimator(Protocol):
     """What makes lighting of a frame's blocks, such as `LightingEstimator`."""
 
-    def estimate(self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None) -> Estimate:
-        """Lighting of one frame from its blocks and the last frame's nuisance."""
+    def estimate(
+        self, means: BlockMeans, time_s: float, nuisance: Nuisance | None = None, order: int | None = None
+    ) -> Estimate:
+        """Lighting of one frame up to an order from its blocks and the last frame's nuisance."""
 
 
 class LightingTracker:
@@ -101,24 +112,38 @@ class LightingTracker:
         estimator: BlockEstimator | None = None,
         clock: Callable[[], float] = perf_counter,
     ) -> None:
-        self._settings = settings or TrackerSettings()
+        self.settings = settings or TrackerSettings()
+        """Of the frames to come; order, samples and how often to estimate may change from frame to frame."""
         self._clock = clock
-        if self._settings.order is not None:
-            orders_up_to(probe.frequencies, self._settings.order)
+        if self.settings.order != "auto":
+            orders_up_to(probe.frequencies, self.settings.order)
         self._radiometry = camera.radiometry
-        self._tracker = PoseTracker(probe, camera, self._settings.alignment_levels)
-        self._meter = BlockMeter(probe, camera, self._settings.samples_per_block, assembly)
-        self._estimator = estimator or LightingEstimator(probe, assembly, bounces=self._settings.bounces)
+        self._tracker = PoseTracker(probe, camera, self.settings.alignment_levels)
+        self._meter = BlockMeter(probe, camera, self.settings.samples_per_block, assembly)
+        self._estimator = estimator or LightingEstimator(
+            probe, assembly, bounces=self.settings.bounces, iterations=self.settings.iterations
+        )
         self._filter = LightingFilter()
         self._exposure = _exposure_meter(probe, camera)
+        self._frequencies = probe.frequencies
+        self._block_order = _block_orders(probe)
+        # products this small run slower on several threads than on one
+        self._blas = ThreadpoolController().select(user_api="blas")
+        self.require(Need.of_coefficients(probe.frequencies))
+
+    def require(self, need: Need) -> None:
+        """Say what the light is wanted for, which the order `auto` goes by; all coefficients by default."""
+        self._choice = OrderChoice(self._frequencies, need)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything about earlier frames."""
         self._tracker.reset()
         self._filter.reset()
+        self._choice.reset()
         self._last: Estimate | None = None
         self._level = np.ones(3)
+        self._since_estimate = 0
 
     def update(self, frame: Frame) -> FrameEstimate:
         """Pose and lighting of the next frame.
@@ -126,8 +151,7 @@ class LightingTracker:
         Raises:
             CameraError: the frame's size is not the camera's.
         """
-        # products this small run slower on several threads than on one
-        with threadpool_limits(limits=1, user_api="blas"):
+        with self._blas.limit(limits=1):
             return self._update(frame)
 
     def _update(self, frame: Frame) -> FrameEstimate:
@@ -135,10 +159,12 @@ class LightingTracker:
         codes, table = luma_plane(frame, self._radiometry)
         pose = self._tracker.update(codes, frame.time_s, table)
         tracked = self._clock()
-        estimate, measured = self._estimate(frame, pose)
-        raw = None if estimate is None else self._cut(estimate.lighting)
+        estimate, measured = self._estimate(frame, pose) if self._is_due(pose) else (None, tracked)
+        raw = None if estimate is None else estimate.lighting
         estimated = self._clock()
-        lighting = self._filtered(raw, frame, pose) if self._settings.filtered else raw
+        lighting = self._filtered(raw, frame, pose) if self.settings.filtered else raw
+        if raw is not None and lighting is not None:
+            self._choice.learn(raw, lighting, frame.time_s)
         timings = {
             "track": tracked - start,
             "measure": measured - tracked,
@@ -150,31 +176,48 @@ class LightingTracker:
         unexplained = float("nan") if estimate is None else estimate.unexplained
         return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, timings, unexplained)
 
-    def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Estimate | None, float]:
-        """The frame's own estimate, and when its blocks had been measured."""
+    def _is_due(self, pose: ProbePose) -> bool:
+        """Whether the light is measured in this frame."""
         if pose.camera_from_probe is None:
-            return None, self._clock()
+            return False
+        self._since_estimate += 1
+        if self._last is not None and self._since_estimate < self.settings.estimate_every:
+            return False
+        self._since_estimate = 0
+        return True
+
+    def _estimate(self, frame: Frame, pose: ProbePose) -> tuple[Estimate, float]:
+        """The frame's own estimate, and when its blocks had been measured."""
+        assert pose.camera_from_probe is not None
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
-        last, measured = self._last, 0.0
+        order = self.settings.order if self.settings.order != "auto" else self._choice.order_to_measure(frame.time_s)
+        blocks = self._block_order <= order
+        last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
             stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
-            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, stripes)
+            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, stripes, blocks)
             measured = self._clock()
-            last = self._estimator.estimate(means, frame.time_s, nuisance)
+            estimate = self._estimator.estimate(means, frame.time_s, nuisance, order)
+            last = estimate if last is None else estimate.with_stripes_elsewhere(blocks, last.stripes)
+        assert last is not None
         self._last = last
         return last, measured
 
     def _filtered(self, raw: Lighting | None, frame: Frame, pose: ProbePose) -> Lighting | None:
         """The light over time, relative to the frame's white paper: a change of exposure is no change of light."""
-        if self._exposure is not None and pose.camera_from_probe is not None:
-            seen = self._exposure.measure(frame, pose.camera_from_probe)
-            if np.all(seen.variance < (_LEVEL_DEVIATION * seen.level) ** 2):
-                self._level = seen.level
-        return self._filter.update(raw, frame.time_s, self._level)
+        seen = pose.camera_from_probe is not None
+        if self._exposure is not None and raw is not None and pose.camera_from_probe is not None:
+            paper = self._exposure.measure(frame, pose.camera_from_probe)
+            if np.all(paper.variance < (_LEVEL_DEVIATION * paper.level) ** 2):
+                self._level = paper.level
+        if raw is not None and self.settings.order == "auto" and raw.order > self._choice.order:
+            raw = raw.truncated(self._choice.order)
+        return self._filter.update(raw, frame.time_s, self._level, hidden=not seen)
 
-    def _cut(self, lighting: Lighting) -> Lighting:
-        order = self._settings.order
-        return lighting if order is None else lighting.truncated(order)
+
+def _block_orders(probe: Probe) -> NDArray[np.int64]:
+    """(blocks,) order of each block's frequency, 0 where there are no stripes."""
+    return frequency_order([block.frequency or (0, 0) for block in field_blocks(probe)])
 
 
 def _exposure_meter(probe: Probe, camera: Camera) -> ExposureMeter | None:
