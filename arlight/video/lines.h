@@ -22,7 +22,7 @@ static HOT void read_codes(const uint8_t *row, int32_t wide, int32_t first, int3
 }
 
 /* The nearest code to a number; what is no number becomes 0. */
-static inline int32_t nearest_code(float value, float zero, float span, float top)
+INLINE int32_t nearest_code(float value, float zero, float span, float top)
 {
     float code = value * span + (zero + 0.5f);
     code = code > 0.0f ? code : 0.0f;
@@ -36,7 +36,7 @@ static HOT void add_line(float *restrict sum, const float *restrict line, float 
         sum[i] += weight * line[i];
 }
 
-static inline int32_t clamped(int32_t value, int32_t low, int32_t high)
+INLINE int32_t clamped(int32_t value, int32_t low, int32_t high)
 {
     return value < low ? low : value < high ? value : high;
 }

@@ -49,7 +49,7 @@ struct picture {
 struct box { int32_t x0, y0, x1, y1; };
 
 /* Linear interpolation in a curve; clamps, and takes what is no number for 0. */
-static inline float through(struct curve curve, float position)
+INLINE float through(struct curve curve, float position)
 {
     float x = position * curve.last;
     x = x > 0.0f ? x : 0.0f;
@@ -59,7 +59,7 @@ static inline float through(struct curve curve, float position)
 }
 
 /* Component k of matrix (3, 3) times (a, b, c). */
-static inline float product(const float *matrix, int k, float a, float b, float c)
+INLINE float product(const float *matrix, int k, float a, float b, float c)
 {
     return matrix[3 * k] * a + matrix[3 * k + 1] * b + matrix[3 * k + 2] * c;
 }
