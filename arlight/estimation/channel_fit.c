@@ -71,7 +71,10 @@ EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t 
     row_noise(f);
     expect_lamps(f);
     expect_light(f);
-    expect_field(f);
+    if (channel == GREEN)
+        expect_field(f);
+    else
+        expect_pattern(f);
     for (int64_t pass = 0; pass < passes; pass++) {
         row_model(f);
         block_equations(f);

@@ -20,6 +20,7 @@ typedef struct {
     const double *colorful; /* (2k - 1) the same of red's and blue's difference from green */
     const double *mean_model;  /* (stride) deviation of the model's error in the means, relative to white */
     const double *basis;    /* (stride, width) reflection field of each block, before Fresnel's factor */
+    const double *basis_planes; /* (field, stride) the same, one plane an amplitude */
     const double *rows;     /* (3, 7, stride) response before blur */
     const double *lower;    /* (7, stride) of the lower face */
     double white_per_irradiance;
@@ -40,6 +41,7 @@ typedef struct {
     double *predicted;      /* (3, 7, stride) */
     double *planes;         /* (PLANES, stride) see below */
     double *field_rows;     /* (stride, width) basis as it is mirrored toward this camera */
+    double *field_planes;   /* (field, stride) the same */
     double *shared;         /* (width, width) equations of the shared unknowns */
     double *stacked;        /* (stride + 8, width) rows whose products they are */
     double *frequency;      /* (frequencies + 1, FREQUENCY) what each frequency's own equations leave */

@@ -35,11 +35,13 @@ class _ChannelFit(Workspace):
     _fields_ = (
         ("m", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("channel", "frequencies", "field", "width", "wide")),
-        *((name, ctypes.c_void_p) for name in ("first", "spread", "colorful", "mean_model", "basis", "rows", "lower")),
+        *((name, ctypes.c_void_p) for name in ("first", "spread", "colorful", "mean_model", "basis")),
+        *((name, ctypes.c_void_p) for name in ("basis_planes", "rows", "lower")),
         *((name, ctypes.c_double) for name in ("white_per_irradiance", "lamp_freedom", "weight_freedom", "weakest")),
         *((name, ctypes.c_void_p) for name in ("nuisances", "scales", "spreads", "lamps", "weights")),
         *((name, ctypes.c_void_p) for name in ("nuisance", "scale", "lamp", "weight", "packed", "covariance")),
-        *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "field_rows", "shared", "stacked")),
+        *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "field_rows", "field_planes")),
+        *((name, ctypes.c_void_p) for name in ("shared", "stacked")),
         *((name, ctypes.c_void_p) for name in ("frequency", "expected", "certain", "solution", "carried")),
         *((name, ctypes.c_void_p) for name in ("carried_light", "fields", "certainty", "products", "small")),
         *((name, ctypes.c_double) for name in ("chi2", "unexplained")),
@@ -122,18 +124,18 @@ class SheetFit:
         self.native.hold({
             "first": self._first.astype(np.int32), "spread": prior_stddev(frequencies, 1.0),
             "colorful": color_stddev(frequencies, 1.0, 1.0), "mean_model": model, "basis": rows,
-            "rows": response.rows, "lower": response.mirror, "nuisances": self.nuisances, "scales": self.scales,
+            "basis_planes": np.ascontiguousarray(rows[:, :field].T), "rows": response.rows, "lower": response.mirror, "nuisances": self.nuisances, "scales": self.scales,
             "spreads": self.spreads, "lamps": self.lamps, "weights": self.weights, "reflection": self.reflection,
             "predicted": self.predicted,
         })  # fmt: skip
         self._pointer = ctypes.byref(self.native)
-        self._make_room(stride, width)
+        self._make_room(stride, width, field)
 
-    def _make_room(self, stride: int, width: int) -> None:
+    def _make_room(self, stride: int, width: int, field: int) -> None:
         unknown = 2 * len(self._frequencies) - 1
         wide, most = _whole(unknown), int(np.diff(self._first).max(initial=1))
         shapes = {
-            "planes": (_PLANES, stride), "field_rows": (stride, width), "shared": (width, width),
+            "planes": (_PLANES, stride), "field_rows": (stride, width), "field_planes": (field, stride), "shared": (width, width),
             "stacked": (stride + 8, width), "frequency": (len(self._frequencies) + 1, _FREQUENCY),
             "expected": (wide,), "certain": (wide,), "solution": (width,), "carried": (width, _WIDE),
             "carried_light": (wide + 1, _WIDE), "fields": (width, stride), "certainty": (width + 8, wide),

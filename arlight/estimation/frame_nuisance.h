@@ -87,24 +87,27 @@ INLINE double cross(const ChannelFit *f, int column, int k, int64_t block)
 
 /* Eliminates a frequency: of its columns' products with the slopes, and of L_0's. CROSS of the mirror becomes that of
    the blocks' field values. */
-static void eliminate_slopes(const ChannelFit *f, int64_t g, double *mean, Step *s)
+static HOT void eliminate_slopes(const ChannelFit *f, int64_t g, double *mean, Step *s)
 {
-    double *own = of_frequency(f, g), column[NUISANCES][2];
+    const int64_t from = f->first[g], n = f->first[g + 1] - from, stride = f->m->stride;
+    const double *own = of_frequency(f, g), *mirror = plane(f, GRAM + WITH_MIRROR + 1) + from;
+    double column[NUISANCES][2], solved[NUISANCES][2];
     for (int k = 0; k < NUISANCES; k++) {
-        column[k][0] = column[k][1] = 0.0;
-        for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-            column[k][0] += cross(f, 1, k, i);
-            column[k][1] += cross(f, 2, k, i);
+        const double *real = plane(f, CROSS + NUISANCES + k) + from, *imaginary = real + NUISANCES * stride;
+        double *field = plane(f, CROSS + COLUMNS * NUISANCES + k) + from, x = 0.0, y = 0.0;
+        for (int64_t i = 0; i < n; i++) {
+            x += real[i];
+            y += imaginary[i];
         }
-        f->carried_light[(2 * g - 1) * WIDE + k] = column[k][0];
-        f->carried_light[2 * g * WIDE + k] = column[k][1];
-        mean[k] -= through(own, own + WITH_MEAN, column[k]);
-        for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-            double mirror[2] = {gram(f, WITH_MIRROR + 1, i), gram(f, WITH_MIRROR + 2, i)};
-            plane(f, CROSS + COLUMNS * NUISANCES + k)[i] -= through(own, mirror, column[k]);
-        }
+        column[k][0] = f->carried_light[(2 * g - 1) * WIDE + k] = x;
+        column[k][1] = f->carried_light[2 * g * WIDE + k] = y;
+        solved[k][0] = own[INVERSE] * x + own[INVERSE + 1] * y;
+        solved[k][1] = own[INVERSE + 1] * x + own[INVERSE + 2] * y;
+        mean[k] -= own[WITH_MEAN] * solved[k][0] + own[WITH_MEAN + 1] * solved[k][1];
+        for (int64_t i = 0; i < n; i++)
+            field[i] -= mirror[i] * solved[k][0] + mirror[stride + i] * solved[k][1];
         for (int l = 0; l <= k; l++)
-            s->information[k][l] -= through(own, column[k], column[l]);
+            s->information[k][l] -= column[k][0] * solved[l][0] + column[k][1] * solved[l][1];
     }
 }
 
@@ -137,18 +140,29 @@ static HOT void shared_slopes(const ChannelFit *f, Step *s)
 /* How a frequency's coefficients move against the nuisance, given how the shared unknowns do. */
 static HOT void carry_frequency(const ChannelFit *f, int64_t g)
 {
-    const double *own = of_frequency(f, g);
+    const double *own = of_frequency(f, g), *real = plane(f, GRAM + WITH_MIRROR + 1);
+    const double *imaginary = plane(f, GRAM + WITH_MIRROR + 2);
     double *x = f->carried_light + (2 * g - 1) * WIDE, *y = x + WIDE;
     lanes left[2] = {load(x), load(y)}, right[2] = {load(x + LANES), load(y + LANES)};
-    for (int64_t j = 0; j <= f->field; j++) {
-        double with[2] = {j < f->field ? 0.0 : own[WITH_MEAN], j < f->field ? 0.0 : own[WITH_MEAN + 1]};
+    const double *mean = f->carried + f->field * WIDE;
+    for (int k = 0; k < 2; k++) {
+        left[k] -= own[WITH_MEAN + k] * load(mean);
+        right[k] -= own[WITH_MEAN + k] * load(mean + LANES);
+    }
+    for (int64_t j = 0; j < f->field; j += LANES) {
+        /* products of the frequency's columns with four amplitudes of the field */
+        lanes with[2] = {splat(0.0), splat(0.0)};
         for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-            with[0] += f->field_rows[i * f->width + j] * gram(f, WITH_MIRROR + 1, i);
-            with[1] += f->field_rows[i * f->width + j] * gram(f, WITH_MIRROR + 2, i);
+            lanes row = load(f->field_rows + i * f->width + j);
+            with[0] += real[i] * row;
+            with[1] += imaginary[i] * row;
         }
-        for (int k = 0; k < 2; k++) {
-            left[k] -= with[k] * load(f->carried + j * WIDE);
-            right[k] -= with[k] * load(f->carried + j * WIDE + LANES);
+        for (int l = 0; l < LANES; l++) {
+            lanes a = load(f->carried + (j + l) * WIDE), b = load(f->carried + (j + l) * WIDE + LANES);
+            for (int k = 0; k < 2; k++) {
+                left[k] -= with[k][l] * a;
+                right[k] -= with[k][l] * b;
+            }
         }
     }
     store(x, own[INVERSE] * left[0] + own[INVERSE + 1] * left[1]);
@@ -227,7 +241,8 @@ static HOT void step_nuisance(const ChannelFit *f, double *packed, Step *s)
         for (int64_t j = 0; j < coefficients(f); j++)
             packed[j] -= f->carried_light[j * WIDE + k] * s->step[k];
     }
-    spread_solution(f, packed);
+    field_of_blocks(f);
+    coefficients_of_blocks(f, packed);
     residuals(f, packed[0], s->step);
 }
 

@@ -43,6 +43,20 @@ INLINE lanes nearest(lanes a)
     return (lanes){__builtin_rint(a[0]), __builtin_rint(a[1]), __builtin_rint(a[2]), __builtin_rint(a[3])};
 }
 
+/* Four rows become four columns. */
+INLINE void transpose(lanes *rows)
+{
+    typedef int64_t places __attribute__((vector_size(32)));
+    const lanes a = __builtin_shuffle(rows[0], rows[1], (places){0, 4, 2, 6});
+    const lanes b = __builtin_shuffle(rows[0], rows[1], (places){1, 5, 3, 7});
+    const lanes c = __builtin_shuffle(rows[2], rows[3], (places){0, 4, 2, 6});
+    const lanes d = __builtin_shuffle(rows[2], rows[3], (places){1, 5, 3, 7});
+    rows[0] = __builtin_shuffle(a, c, (places){0, 1, 4, 5});
+    rows[1] = __builtin_shuffle(b, d, (places){0, 1, 4, 5});
+    rows[2] = __builtin_shuffle(a, c, (places){2, 3, 6, 7});
+    rows[3] = __builtin_shuffle(b, d, (places){2, 3, 6, 7});
+}
+
 /* exp to 1e-14, for -700 to 700. */
 INLINE lanes exponential(lanes x)
 {

@@ -12,10 +12,10 @@
    products of columns are covariances. */
 static HOT void whiten_fields(const ChannelFit *f)
 {
-    const int64_t n = f->m->stride, blocks = f->m->blocks, columns = (blocks + 7) / 8 * 8;
-    for (int64_t i = 0; i < columns; i++)
-        for (int64_t j = 0; j <= f->field; j++)
-            f->fields[j * n + i] = i < blocks && j < f->field ? f->field_rows[i * f->width + j] : 0.0;
+    const int64_t n = f->m->stride, columns = (f->m->blocks + 2 * LANES - 1) / (2 * LANES) * (2 * LANES);
+    for (int64_t j = 0; j <= f->field; j++)
+        for (int64_t b = 0; b < columns; b += LANES)
+            store(f->fields + j * n + b, j < f->field ? load(f->field_planes + j * n + b) : splat(0.0));
     substitute_forward(f->field + 1, f->shared, f->width, f->fields, n, columns);
 }
 
@@ -43,58 +43,97 @@ INLINE void share_of_mean(const ChannelFit *f, int64_t g, double *share)
 /* Rows of `certainty` from the shared unknowns; the row of L_0 alone comes last. */
 static HOT void certainty_of_shared(const ChannelFit *f)
 {
-    const int64_t n = f->m->stride;
+    const int64_t n = f->m->stride, wide = f->wide;
+    const double *real = plane(f, SHARES), *imaginary = plane(f, SHARES + 1);
+    double *last = f->certainty + f->field * wide;
     for (int64_t k = 0; k <= f->field; k++) {
-        double *row = f->certainty + k * f->wide;
-        row[0] = k == f->field ? 1.0 / f->shared[k * (f->width + 1)] : 0.0;
-        for (int64_t i = coefficients(f); i < f->wide; i++)
-            row[i] = 0.0;
+        f->certainty[k * wide] = 0.0;
+        for (int64_t i = coefficients(f); i < wide; i++)
+            f->certainty[k * wide + i] = 0.0;
     }
     for (int64_t g = 1; g <= f->frequencies; g++) {
-        const double *real = plane(f, SHARES), *imaginary = plane(f, SHARES + 1);
-        double mean[2];
-        share_of_mean(f, g, mean);
+        double *to = f->certainty + 2 * g - 1;
         for (int64_t k = 0; k <= f->field; k++) {
-            double *row = f->certainty + k * f->wide, x = mean[0] * row[0], y = mean[1] * row[0];
+            const double *fields = f->fields + k * n;
+            double x = 0.0, y = 0.0;
             for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-                x += real[i] * f->fields[k * n + i];
-                y += imaginary[i] * f->fields[k * n + i];
+                x += real[i] * fields[i];
+                y += imaginary[i] * fields[i];
             }
-            row[2 * g - 1] = x;
-            row[2 * g] = y;
+            to[k * wide] = x;
+            to[k * wide + 1] = y;
         }
     }
+    last[0] = 1.0 / f->shared[f->field * (f->width + 1)];
+    for (int64_t g = 1; g <= f->frequencies; g++) {
+        double mean[2];
+        share_of_mean(f, g, mean);
+        last[2 * g - 1] += mean[0] * last[0];
+        last[2 * g] += mean[1] * last[0];
+    }
+}
+
+/* Rows of `certainty` from the nuisance and from what scales all; returns how many rows there are together. */
+static HOT int64_t certainty_beside(const ChannelFit *f, const double *packed, const Step *s)
+{
+    const int64_t n = coefficients(f);
+    double *rows = f->certainty + (f->field + 1) * f->wide;
+    for (int64_t i = 0; i < (NUISANCES + 1) * f->wide; i++)
+        rows[i] = 0.0;
+    for (int64_t i = 0; i < n; i++) {
+        const double *moved = f->carried_light + i * WIDE;
+        for (int k = 0; k < NUISANCES; k++) {
+            double sum = 0.0;
+            for (int l = 0; l <= k; l++)
+                sum += s->doubt[k][l] * moved[l];
+            rows[k * f->wide + i] = sum;
+        }
+        rows[NUISANCES * f->wide + i] = GAIN_DOUBT * packed[i];
+    }
+    return f->field + 1 + NUISANCES + 1;
+}
+
+/* Writes a symmetric matrix (n, n) from its upper tiles of four by four. */
+static HOT void unfold(int64_t n, const double *upper, int64_t stride, double *whole)
+{
+    for (int64_t i = 0; i < n; i += LANES)
+        for (int64_t j = i; j < n; j += LANES) {
+            int64_t rows = n - i < LANES ? n - i : LANES, columns = n - j < LANES ? n - j : LANES;
+            lanes tile[LANES];
+            for (int r = 0; r < LANES; r++)
+                tile[r] = load(upper + (i + r) * stride + j);
+            if (rows == LANES && columns == LANES) {
+                for (int r = 0; r < LANES; r++)
+                    store(whole + (i + r) * n + j, tile[r]);
+                transpose(tile);
+                for (int r = 0; r < LANES; r++)
+                    store(whole + (j + r) * n + i, tile[r]);
+                continue;
+            }
+            for (int64_t r = 0; r < rows; r++)
+                for (int64_t c = 0; c < columns; c++)
+                    whole[(i + r) * n + j + c] = whole[(j + c) * n + i + r] = tile[r][c];
+        }
 }
 
 /* Fills the channel's covariance. */
 static HOT void light_covariance(const ChannelFit *f, const double *packed, const Step *s)
 {
-    const int64_t n = coefficients(f), rows = f->field + 1;
-    double *result = f->covariance + f->channel * n * n;
+    const int64_t n = coefficients(f);
     certainty_of_shared(f);
-    for (int64_t i = 0; i < f->wide; i++) {
-        int64_t within = i < n;
-        for (int k = 0; k < NUISANCES; k++) {
-            double sum = 0.0;
-            for (int l = 0; l <= k && within; l++)
-                sum += s->doubt[k][l] * f->carried_light[i * WIDE + l];
-            f->certainty[(rows + k) * f->wide + i] = sum;
-        }
-        f->certainty[(rows + NUISANCES) * f->wide + i] = within ? GAIN_DOUBT * packed[i] : 0.0;
-    }
+    int64_t rows = certainty_beside(f, packed, s);
     for (int64_t i = 0; i < f->wide * f->wide; i++)
         f->products[i] = 0.0;
-    add_products(rows + NUISANCES + 1, f->wide, f->certainty, f->wide, 1.0, f->products, f->wide);
+    add_products(rows, f->wide, f->certainty, f->wide, 1.0, f->products, f->wide);
     for (int64_t g = 1; g <= f->frequencies; g++) {
         const double *own = of_frequency(f, g);
         double *at_own = f->products + (2 * g - 1) * (f->wide + 1);
         at_own[0] += own[INVERSE];
         at_own[1] += own[INVERSE + 1];
+        at_own[f->wide] += own[INVERSE + 1];
         at_own[f->wide + 1] += own[INVERSE + 2];
     }
-    for (int64_t i = 0; i < n; i++)
-        for (int64_t j = i; j < n; j++)
-            result[i * n + j] = result[j * n + i] = f->products[i * f->wide + j];
+    unfold(n, f->products, f->wide, f->covariance + f->channel * n * n);
 }
 
 #endif

@@ -13,7 +13,7 @@ typedef struct {
     int64_t blocks;             /* that are asked for, the first ones; planes are filled to whole lanes */
     int64_t stride;             /* length of a plane */
     int64_t columns;            /* 3, or 5 where the film has a second harmonic */
-    int64_t unknown;            /* 2k - 1 real coefficients of the light */
+    int64_t unknown;            /* real coefficients of the light, 2k - 1, filled up to whole lanes */
     int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0: no such light */
     int64_t folded;             /* whether light of twice the frequency is counted with that of L_0, by the shape */
     double index;               /* of refraction */
@@ -146,10 +146,10 @@ INLINE Series lit(const Response *r, int64_t block)
 static HOT void echo_of_shape(const Response *r)
 {
     for (int64_t i = 0; i < r->kinds * PARTS; i++) {
-        double sum = 0.0;
-        for (int64_t k = 0; k < r->unknown; k++)
-            sum += r->echo[i * r->unknown + k] * r->shape[k];
-        r->echoed[i] = sum;
+        lanes sum = splat(0.0);
+        for (int64_t k = 0; k < r->unknown; k += LANES)
+            sum += load(r->echo + i * r->unknown + k) * load(r->shape + k);
+        r->echoed[i] = total(sum);
     }
 }
 

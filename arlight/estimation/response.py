@@ -78,7 +78,7 @@ class BlockResponse:
         self.places, known = _places(probe, blocks, light.radiosity.shape[2])
         self.sequence = np.argsort(self.places[:, 1], kind="stable")
         self._count, unknown = len(blocks), 2 * len(probe.frequencies) - 1
-        self._shape = np.zeros(unknown)
+        self._shape = np.zeros(-(-unknown // _LANES) * _LANES)
         if light.echo is not None:
             self._usual_shape = uniform_light(slab, self._measured)
         else:
@@ -87,7 +87,11 @@ class BlockResponse:
         self.phasor, self.cosine = np.zeros((2, stride)), np.ones(stride)
         self.rows, self.mirror = np.zeros((self.places.shape[1], ROWS, stride)), np.zeros((ROWS, stride))
         self._native = _Response(
-            blocks=stride, stride=stride, columns=self.places.shape[1], unknown=unknown, index=slab.refractive_index
+            blocks=stride,
+            stride=stride,
+            columns=self.places.shape[1],
+            unknown=len(self._shape),
+            index=slab.refractive_index,
         )
         self._native.hold({
             "shape": self._shape, "phasor": self.phasor, "cosine": self.cosine, "rows": self.rows,
@@ -108,7 +112,10 @@ class BlockResponse:
             self._native.kinds = len(light.echo.irradiance)
             kind[: self._count] = light.echo.kind[self.sequence]
             tables["gathered"] = np.moveaxis(_real_matrix(light.gathered), 0, 2)
-            echo = np.ascontiguousarray(np.swapaxes(real_parts(np.swapaxes(light.echo.irradiance, 1, 2)), 1, 2))
+            echo = np.zeros((self._native.kinds, _PARTS, len(self._shape)))
+            echo[:, :, : light.echo.irradiance.shape[2]] = np.swapaxes(
+                real_parts(np.swapaxes(light.echo.irradiance, 1, 2)), 1, 2
+            )
             self._native.hold({"echo": echo, "echoed": np.zeros((len(echo), _PARTS))})
         self._native.hold({"kind": kind, **{name: self._planes(table, stride) for name, table in tables.items()}})
 
@@ -154,7 +161,7 @@ class BlockResponse:
             folded: count light of twice a block's frequency with that of L_0, by the shape; of `rows` only the first
                 three columns are filled then.
         """
-        self._shape[:] = self._usual_shape if shape is None else self._completed(shape)
+        self._shape[: len(self._usual_shape)] = self._usual_shape if shape is None else self._completed(shape)
         self._native.blocks, self._native.folded = count, folded
         _native.light_rows(ctypes.byref(self._native))
         _native.mirror_rows(ctypes.byref(self._native))
@@ -162,7 +169,7 @@ class BlockResponse:
     def _completed(self, shape: Array) -> Array:
         """Coefficients that were not measured, by the sky that the measured ones predict."""
         known = len(shape)
-        if known == len(self._shape):
+        if known == len(self._usual_shape):
             return shape
         if known not in self._beyond:
             operator = received_operator(self._slab, self._measured, *sky_directions())

@@ -73,35 +73,44 @@ static void reduce_group(const ChannelFit *f, int64_t from, int64_t n, const dou
     }
 }
 
-/* Writes rows of the shared unknowns whose outer products are a group's equations; returns how many. What is left of
-   L_0 alone is added to the shared equations at once. */
-static HOT int64_t stack_group(const ChannelFit *f, int64_t from, int64_t n, const double *own, double *rows)
+/* Replaces a group's equations by the rows of their factor, as far as field values go; where a block says nothing its
+   row is 0. */
+static void factorise_group(int64_t n, double *k)
 {
-    double *k = f->small, *mean = f->shared + (f->field) * f->width + f->field;
-    int64_t w = n + 2, count = 0;
-    reduce_group(f, from, n, own, k);
+    int64_t w = n + 2;
     for (int64_t i = 0; i < n; i++) {
-        double pivot = k[i * w + i];
-        if (!(pivot > 1e-13 * gram(f, MIRROR_SQUARE, from + i)))
-            continue;
-        double reciprocal = 1.0 / sqrt(pivot), *row = rows + count++ * f->width;
+        double pivot = k[i * w + i], reciprocal = pivot > 0.0 ? 1.0 / sqrt(pivot) : 0.0;
         for (int64_t j = i; j < w; j++)
             k[i * w + j] *= reciprocal;
-        for (int64_t c = 0; c < f->width; c += LANES) {
-            lanes sum = splat(0.0);
-            for (int64_t j = i; j < n; j++)
-                sum += k[i * w + j] * load(f->field_rows + (from + j) * f->width + c);
-            store(row + c, sum);
-        }
-        row[f->field] = k[i * w + n];
-        row[f->field + 1] = k[i * w + n + 1];
         for (int64_t j = i + 1; j <= n; j++)
             for (int64_t l = j; l < w; l++)
                 k[j * w + l] -= k[i * w + j] * k[i * w + l];
     }
+}
+
+/* Writes n rows of the shared unknowns whose outer products are a group's equations. What is left of L_0 alone is added
+   to the shared equations at once. */
+static HOT void stack_group(const ChannelFit *f, int64_t from, int64_t n, const double *own, double *rows)
+{
+    double *k = f->small, *mean = f->shared + f->field * f->width + f->field;
+    int64_t w = n + 2;
+    reduce_group(f, from, n, own, k);
+    factorise_group(n, k);
+    for (int64_t c = 0; c < f->width; c += LANES) {
+        const double *fields = f->field_rows + from * f->width + c;
+        for (int64_t i = 0; i < n; i++) {
+            lanes sum = k[i * w + i] * load(fields + i * f->width);
+            for (int64_t j = i + 1; j < n; j++)
+                sum += k[i * w + j] * load(fields + j * f->width);
+            store(rows + i * f->width + c, sum);
+        }
+    }
+    for (int64_t i = 0; i < n; i++) {
+        rows[i * f->width + f->field] = k[i * w + n];
+        rows[i * f->width + f->field + 1] = k[i * w + n + 1];
+    }
     mean[0] += k[n * w + n];
     mean[1] += k[n * w + n + 1];
-    return count;
 }
 
 /* Prior of the shared unknowns. */
@@ -119,16 +128,22 @@ static void start_shared(const ChannelFit *f)
     f->shared[f->field * (f->width + 1) + 1] = f->certain[0] * f->expected[0];
 }
 
-/* Planes FIELD, REAL and IMAGINARY of a solution. */
-static HOT void spread_solution(const ChannelFit *f, const double *packed)
+/* Fills FIELD. */
+static HOT void field_of_blocks(const ChannelFit *f)
 {
-    double *field = plane(f, FIELD), *real = plane(f, REAL), *imaginary = plane(f, IMAGINARY);
+    double *field = plane(f, FIELD);
     for (int64_t i = 0; i < f->m->blocks; i++) {
         lanes sum = splat(0.0);
         for (int64_t c = 0; c < f->width; c += LANES)
             sum += load(f->field_rows + i * f->width + c) * load(f->solution + c);
         field[i] = total(sum);
     }
+}
+
+/* Fills REAL and IMAGINARY. */
+static void coefficients_of_blocks(const ChannelFit *f, const double *packed)
+{
+    double *real = plane(f, REAL), *imaginary = plane(f, IMAGINARY);
     for (int64_t g = 0; g <= f->frequencies; g++)
         for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
             real[i] = g ? packed[2 * g - 1] : 0.0;
@@ -156,16 +171,16 @@ static void substitute_frequencies(const ChannelFit *f, double *packed)
 /* Solves for all unknowns: packed coefficients, `solution`, and the planes FIELD, REAL and IMAGINARY. */
 static HOT void solve_shared(const ChannelFit *f, double *packed)
 {
-    int64_t rows = 0, pivots = f->field + 1;
+    const int64_t pivots = f->field + 1;
     start_shared(f);
     for (int64_t i = f->first[0]; i < f->first[1]; i++)
-        rows += stack_group(f, i, 1, 0, f->stacked + rows * f->width);
+        stack_group(f, i, 1, 0, f->stacked + i * f->width);
     for (int64_t g = 1; g <= f->frequencies; g++) {
+        int64_t from = f->first[g];
         solve_frequency(f, g);
-        int64_t from = f->first[g], n = f->first[g + 1] - from;
-        rows += stack_group(f, from, n, of_frequency(f, g), f->stacked + rows * f->width);
+        stack_group(f, from, f->first[g + 1] - from, of_frequency(f, g), f->stacked + from * f->width);
     }
-    add_products(rows, f->width, f->stacked, f->width, 1.0, f->shared, f->width);
+    add_products(f->m->blocks, f->width, f->stacked, f->width, 1.0, f->shared, f->width);
     factorise(pivots, f->width, f->shared, f->width);
     for (int64_t k = 0; k < f->width; k++)
         f->solution[k] = 0.0;
@@ -179,9 +194,9 @@ static HOT void solve_shared(const ChannelFit *f, double *packed)
     }
     packed[0] = f->solution[f->field];
     f->solution[f->field] = 0.0;
-    spread_solution(f, packed);
+    field_of_blocks(f);
     substitute_frequencies(f, packed);
-    spread_solution(f, packed);
+    coefficients_of_blocks(f, packed);
 }
 
 #endif
