@@ -6,7 +6,8 @@ from time import process_time
 
 from arlight.benchmark.speed.estimation_pass import WARM_UP, Clock, single_threaded
 from arlight.benchmark.speed.playback import FilmedClip
-from arlight.lighting_tracker import FrameEstimate, LightingTracker, TrackerSettings
+from arlight.lighting_tracker import FrameEstimate, TrackerSettings
+from arlight.pipeline import Pipeline
 from arlight.rendering.relight import Relighter
 from arlight.synthetic.truth import FrameTruth
 from arlight.video.frame import Frame
@@ -16,10 +17,8 @@ from arlight.video.frame import Frame
 class Contender:
     """One way to do a frame, and what its frames cost."""
 
-    tracker: LightingTracker
-    """Estimates."""
-    relighter: Relighter | None
-    """Draws; None where drawing is not measured."""
+    pipeline: Pipeline
+    """Estimates and draws."""
     estimate_s: list[float] = field(default_factory=list)
     """CPU time of every estimate [s]."""
     relight_s: list[float] = field(default_factory=list)
@@ -76,12 +75,9 @@ def contend(
                 contest.truth.append(truth)
             for number, contender in enumerate(contenders):
                 begun = clock()
-                estimate = contender.tracker.update(frame)
+                estimate = contender.pipeline.estimate(frame)
                 estimated = clock()
-                composite = frame
-                if contender.relighter is not None:
-                    pose = estimate.pose.camera_from_probe
-                    composite = contender.relighter.render(frame, pose, estimate.lighting)
+                composite = contender.pipeline.relight(frame, estimate).composite
                 relit = clock()
                 if frame.index < WARM_UP:
                     continue
@@ -93,6 +89,6 @@ def contend(
     return contest
 
 
-def contender(clip: FilmedClip, settings: TrackerSettings, relighter: Relighter | None) -> Contender:
-    """Someone to contend on a clip; the estimate's stages are told in CPU time."""
-    return Contender(LightingTracker(clip.probe, clip.camera, settings, clock=process_time), relighter)
+def contender(clip: FilmedClip, settings: TrackerSettings, relighter: Relighter) -> Contender:
+    """Someone to contend on a clip."""
+    return Contender(Pipeline(clip.probe, clip.camera, relighter, settings))

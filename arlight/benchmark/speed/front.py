@@ -33,7 +33,7 @@ class FrontPoint:
     cost_ms: Spread
     """CPU time a frame, from tracking to the composite [ms]."""
     stages_ms: dict[str, float]
-    """Its parts, medians [ms]."""
+    """Wall time of the estimation's stages and of drawing, medians [ms]."""
     estimate_over_aruco: Spread
     """Pose and light, relative to ArUco's detection and solvePnP on the same frames."""
     estimate_ms: float
@@ -96,7 +96,7 @@ def _measure_clip(
         contender(
             clip,
             setting.preset.tracker,
-            relighters.of(clip.probe, clip.camera, setting.preset.relight, setting.preset.tracker.order),
+            relighters.of(clip.probe, clip.camera, setting.preset.relight),
         )
         for setting in settings
     ]
@@ -127,7 +127,7 @@ def _point(setting: FrontSetting, rows: Sequence[_Row]) -> FrontPoint:
 
 
 def _stages_ms(contender: Contender) -> dict[str, float]:
-    """Median CPU time of every stage [ms]."""
+    """Median wall time of every stage [ms]."""
     stages: dict[str, list[float]] = {}
     for estimate in contender.estimates:
         for stage, seconds in estimate.timings_s.items():

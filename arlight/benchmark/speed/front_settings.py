@@ -5,7 +5,6 @@ from typing import Any
 
 from arlight.lighting_tracker import TrackerSettings
 from arlight.presets import PRESETS, Preset
-from arlight.rendering.settings import RelightSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,27 +30,31 @@ def front_settings(quick: bool) -> tuple[FrontSetting, ...]:
 def _changed(base: Preset, changes: dict[str, Any]) -> Preset:
     """A preset with some knobs turned, each where it belongs."""
     tracker = {knob: value for knob, value in changes.items() if knob in TrackerSettings.__slots__}
-    relight = {knob: value for knob, value in changes.items() if knob in RelightSettings.__slots__}
+    relight = {knob: value for knob, value in changes.items() if knob not in tracker}
     return replace(base, tracker=replace(base.tracker, **tracker), relight=replace(base.relight, **relight))
 
 
 _QUICK: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("order 5", {"order": 5}),
     ("order 3", {"order": 3}),
     ("300 samples", {"samples_per_block": 300}),
     ("supersampling 1", {"supersampling": 1}),
 )
+_CHEAP: dict[str, Any] = {"samples_per_block": 300, "supersampling": 1, "shadow_texels": 64}
 _FULL: tuple[tuple[str, dict[str, Any]], ...] = (
     *((f"order {order}", {"order": order}) for order in (0, 1, 2, 4)),
     *((f"{count} samples", {"samples_per_block": count}) for count in (100, 600, 2400)),
+    ("1 iteration", {"iterations": 1}),
+    *((f"every {every} frames", {"estimate_every": every}) for every in (2, 4, 8)),
     ("supersampling 3", {"supersampling": 3}),
     ("shadow 64", {"shadow_texels": 64}),
     ("shadow 256", {"shadow_texels": 256}),
     ("192 directions", {"directions": 192}),
-    ("order 3, 300 samples", {"order": 3, "samples_per_block": 300}),
-    ("order 3, 300 samples, supersampling 1", {"order": 3, "samples_per_block": 300, "supersampling": 1}),
-    ("order 2, 300 samples, supersampling 1", {"order": 2, "samples_per_block": 300, "supersampling": 1}),
-    (
-        "order 1, 100 samples, supersampling 1, shadow 64",
-        {"order": 1, "samples_per_block": 100, "supersampling": 1, "shadow_texels": 64},
-    ),
+    ("4 000 triangles", {"mesh_faces": 4_000}),
+    ("64 000 triangles", {"mesh_faces": 64_000}),
+    *((f"cheap, order {order}", {**_CHEAP, "order": order}) for order in (1, 2, 3, 5)),
+    ("cheap, every 2 frames", {**_CHEAP, "estimate_every": 2}),
+    ("cheap, every 4 frames", {**_CHEAP, "estimate_every": 4}),
+    ("cheap, order 3, every 4 frames", {**_CHEAP, "order": 3, "estimate_every": 4}),
+    ("dear", {"order": 5, "samples_per_block": 2400, "supersampling": 3, "shadow_texels": 256, "directions": 1536}),
 )

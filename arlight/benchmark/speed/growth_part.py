@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import trimesh
-
 from arlight.benchmark.speed.contest import Contender, contend, contender
 from arlight.benchmark.speed.findings import Findings
 from arlight.benchmark.speed.playback import FilmedClip, load_clip
@@ -12,14 +10,11 @@ from arlight.benchmark.speed.relighters import Relighters
 from arlight.benchmark.speed.spread import spread
 from arlight.benchmark.speed.workloads import Workload, still_workload
 from arlight.lighting_tracker import TrackerSettings
-from arlight.rendering.mesh import Mesh
-from arlight.rendering.relight import Relighter
 from arlight.rendering.settings import RelightSettings
 
 SHEET_WIDTHS_PX = (250.0, 400.0, 650.0)
 SIZES = ((854, 480), (1280, 720), (1920, 1080), (3840, 2160))
-SUBDIVISIONS = (3, 4, 5, 6)
-"""Of an icosahedron: 1280 to 81920 faces."""
+MESH_FACES = (1_000, 4_000, 16_000, 80_000)
 _SHEET_IN_EVERY_SIZE_PX = 400.0
 
 
@@ -45,8 +40,7 @@ def grow_with_order_setting(clip: FilmedClip, frames: int, relighters: Relighter
     """Cost over the order that is asked for, on one sheet."""
     orders = range(clip.probe.order + 1)
     contenders = [
-        contender(clip, TrackerSettings(order=order), relighters.of(clip.probe, clip.camera, order=order))
-        for order in orders
+        contender(clip, TrackerSettings(order=order), relighters.of(clip.probe, clip.camera)) for order in orders
     ]
     contend(clip, frames, contenders)
     return _grown("order asked for", list(zip(orders, contenders, strict=True)))
@@ -70,19 +64,14 @@ def grow_with_size(folder: Path, frames: int, relighters: Relighters) -> Finding
     return _grown("height of the picture, px", found)
 
 
-def grow_with_mesh(clip: FilmedClip, frames: int) -> Findings:
-    """Cost over the faces of the object."""
-    found = []
-    for subdivisions in SUBDIVISIONS:
-        mesh = _ball(subdivisions)
-        relighter = Relighter(mesh, clip.probe, clip.camera, RelightSettings())
-        try:
-            each = contender(clip, TrackerSettings(), relighter)
-            contend(clip, frames, [each])
-        finally:
-            relighter.release()
-        found.append((len(mesh.faces), each))
-    return _grown("faces of the object", found)
+def grow_with_mesh(clip: FilmedClip, frames: int, relighters: Relighters) -> Findings:
+    """Cost over the triangles that are drawn."""
+    contenders = [
+        contender(clip, TrackerSettings(), relighters.of(clip.probe, clip.camera, RelightSettings(mesh_faces=faces)))
+        for faces in MESH_FACES
+    ]
+    contend(clip, frames, contenders)
+    return _grown("triangles of the object", list(zip(MESH_FACES, contenders, strict=True)))
 
 
 def _alone(clip: FilmedClip, frames: int, relighters: Relighters) -> Contender:
@@ -101,16 +90,3 @@ def _grown(axis: str, measured: Sequence[tuple[float, Contender]]) -> Findings:
         for value, each in measured
     ]
     return Findings(details={"growth": {axis: rows}})
-
-
-def _ball(subdivisions: int) -> Mesh:
-    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
-    vertices = ball.vertices + [0.0, 0.0, 1.0]
-    colour = (0.6, 0.5, 0.4)
-    return Mesh(
-        vertices,
-        ball.vertices.copy(),
-        ball.faces.astype("int32"),
-        (vertices * 0.0 + colour).astype("float32"),
-        closed=True,
-    )

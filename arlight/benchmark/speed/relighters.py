@@ -3,11 +3,10 @@
 from arlight.camera import Camera
 from arlight.probe.design import Probe
 from arlight.rendering.default_object import default_object
-from arlight.rendering.mesh import Mesh
 from arlight.rendering.relight import Relighter
 from arlight.rendering.settings import RelightSettings
 
-FINEST = RelightSettings(directions=1536, shadow_texels=256, supersampling=4, renderer="moderngl")
+FINEST = RelightSettings(directions=1536, shadow_texels=256, supersampling=4, mesh_faces=160_000, renderer="moderngl")
 """Settings of the pictures that others are compared with."""
 
 
@@ -15,22 +14,18 @@ class Relighters:
     """Keeps what is slow to make; release it when done."""
 
     def __init__(self) -> None:
-        self._made: dict[tuple[int, tuple[int, int], RelightSettings, int | None], Relighter] = {}
-        self._mesh: Mesh | None = None
+        self._made: dict[tuple[int, tuple[int, int], RelightSettings], Relighter] = {}
 
-    def of(
-        self, probe: Probe, camera: Camera, settings: RelightSettings | None = None, order: int | None = None
-    ) -> Relighter:
+    def of(self, probe: Probe, camera: Camera, settings: RelightSettings | None = None) -> Relighter:
         """The default object over a sheet.
 
         Raises:
             RenderingUnavailableError: there is no headless OpenGL.
         """
         settings = settings or RelightSettings()
-        key = (probe.order, camera.image_size, settings, order)
+        key = (probe.order, camera.image_size, settings)
         if key not in self._made:
-            self._mesh = self._mesh or default_object()
-            self._made[key] = Relighter(self._mesh, probe, camera, settings, order=order)
+            self._made[key] = Relighter(default_object(settings.lit_faces), probe, camera, settings)
         return self._made[key]
 
     def release(self) -> None:

@@ -143,7 +143,7 @@ class Suite:
 
     def _loop(self, name: str) -> Findings:
         clip, preset = self.clip(name), PRESETS["balanced"]
-        relighter = self.relighters.of(clip.probe, clip.camera, preset.relight, preset.tracker.order)
+        relighter = self.relighters.of(clip.probe, clip.camera, preset.relight)
         frames, repeats = self._count(72, 240), self._count(3, 5)
         return measure_loop(clip, frames, repeats, preset, relighter, self.scratch)
 
@@ -181,5 +181,5 @@ _GROWTH: dict[str, Callable[[Suite], Findings]] = {
     ),
     "the sheet's width": lambda suite: growth_part.grow_with_sheet_width(suite.frames_folder, 24, suite.relighters),
     "the picture's size": lambda suite: growth_part.grow_with_size(suite.frames_folder, 24, suite.relighters),
-    "the object's faces": lambda suite: growth_part.grow_with_mesh(suite.clip(HEADLINE), 24),
+    "the object's faces": lambda suite: growth_part.grow_with_mesh(suite.clip(HEADLINE), 24, suite.relighters),
 }

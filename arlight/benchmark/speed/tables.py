@@ -103,7 +103,7 @@ def _preset_table(found: Findings) -> Table:
         table.add_column(point["name"], justify="right")
     table.add_row("track to filter over ArUco", *(f"{p['estimate_over_aruco']['median']:.3f}" for p in presets))
     for stage in presets[0]["stages_ms"]:
-        table.add_row(f"{stage}, CPU ms", *(f"{p['stages_ms'][stage]:.2f}" for p in presets))
+        table.add_row(f"{stage}, ms", *(f"{p['stages_ms'][stage]:.2f}" for p in presets))
     for order, _ in enumerate(presets[0]["error_by_order"]):
         table.add_row(f"error of order {order}, % of |L_0|", *(_percent(p["error_by_order"][order]) for p in presets))
     table.add_row("error of the relit picture, %", *(_percent(p["relighting_error"]) for p in presets))

@@ -13,7 +13,7 @@ from arlight.benchmark.speed.playback import FilmedClip
 from arlight.benchmark.speed.spread import paired_ratio, spread
 from arlight.benchmark.speed.yardsticks import PoseYardstick
 from arlight.camera import Camera
-from arlight.lighting_tracker import LightingTracker
+from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.design import Probe
 from arlight.rendering.relight import Relighter
 
@@ -21,8 +21,8 @@ _SHOWN_FRAMES = 6
 
 
 def usual_tracker(probe: Probe, camera: Camera, clock: Clock) -> LightingTracker:
-    """The tracker with its default settings."""
-    return LightingTracker(probe, camera, clock=clock)
+    """The tracker with its default settings, for light of all orders that the sheet measures."""
+    return LightingTracker(probe, camera, TrackerSettings(order=probe.order), clock=clock)
 
 
 def measure_tracking(

@@ -61,9 +61,9 @@ def test_all_points_are_measured_and_coarser_ones_are_worse(clip):
     coarse = RelightSettings(directions=64, shadow_texels=32, supersampling=1)
     usual = replace(coarse, supersampling=2)
     settings = [
-        FrontSetting("fine", Preset(TrackerSettings(), usual), is_preset=True),
+        FrontSetting("fine", Preset(TrackerSettings(order=1), usual), is_preset=True),
         FrontSetting("order 0", Preset(TrackerSettings(order=0), usual)),
-        FrontSetting("coarse", Preset(TrackerSettings(), coarse)),
+        FrontSetting("coarse", Preset(TrackerSettings(order=1), coarse)),
     ]
     relighters = Relighters()
     try:

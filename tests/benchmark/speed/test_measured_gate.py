@@ -31,9 +31,9 @@ class ChangedEstimator:
     def __init__(self, probe, clock, extra_s=0.0, gain=1.0):
         self._own, self._clock, self._extra_s, self._gain = LightingEstimator(probe), clock, extra_s, gain
 
-    def estimate(self, means, time_s, nuisance=None):
+    def estimate(self, means, time_s, nuisance=None, order=None):
         self._clock.now_s += self._extra_s
-        estimate = self._own.estimate(means, time_s, nuisance)
+        estimate = self._own.estimate(means, time_s, nuisance, order)
         coefficients = estimate.lighting.coefficients.copy()
         coefficients[1:] *= self._gain
         return replace(estimate, lighting=replace(estimate.lighting, coefficients=coefficients))
