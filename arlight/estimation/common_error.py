@@ -65,6 +65,11 @@ class CommonError:
         """Another light, seen first in a frame: what is known of the errors is kept."""
         _LIBRARY.common_start(self._at, ctypes.byref(frame.shared))
 
+    def adopt(self, other: "CommonError") -> None:
+        """Keep what another knows of the errors; the frames that it saw may be of other frequencies."""
+        for name in ("independent", "shown", "lately", "averaged"):
+            setattr(self.shared, name, getattr(other.shared, name))
+
     @property
     def independent(self) -> float:
         """Share of a frame's error that is independent of the other frames', in [0, 1]."""

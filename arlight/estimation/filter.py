@@ -38,15 +38,16 @@ class LightingFilter:
                 frame that was only left out is predicted with it.
 
         Returns:
-            Coefficients with covariance; None before the first estimate. The first one, and one of other frequencies
-            than before, is returned as it is.
+            Coefficients with covariance, of the frequencies of the last estimate; None before the first, which is
+            returned as it is.
         """
         exposure = _ONES if exposure is None else exposure
-        if measured is not None and (self._light is None or len(measured.frequencies) != len(self._light.frequencies)):
-            self._light, self._time_s = FollowedLight(measured, exposure), time_s
-            return measured
         if self._light is None:
-            return None
+            if measured is not None:
+                self._light, self._time_s = FollowedLight(measured, exposure), time_s
+            return measured
+        if measured is not None and len(measured.frequencies) != len(self._light.frequencies):
+            self._light = self._light.of_frequencies(measured, exposure)
         time_s = max(time_s, self._time_s)
         dt, self._time_s = time_s - self._time_s, time_s
         # nothing confirms a trend while the sheet is hidden

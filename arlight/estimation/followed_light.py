@@ -66,22 +66,39 @@ class FollowedLight:
         )
         common = CommonError(len(memories), *shape)
         typical = TypicalError(_STILL_MEMORY_S, frame, memories)
-        parts = {"frame": frame, "told": told, "common": common, "typical": typical}
         self._exposure = np.ones(shape[0])
         self._shared = _Shared(
-            **{name: ctypes.addressof(part.shared) for name, part in parts.items()},
+            frame=ctypes.addressof(frame.shared), told=ctypes.addressof(told.shared),
+            common=ctypes.addressof(common.shared), typical=ctypes.addressof(typical.shared),
             memories=(ctypes.c_void_p * 2)(*(ctypes.addressof(memory.shared) for memory in memories)),
             usual=1.0,
             level_errors=(ctypes.c_double * _MOST_CHANNELS)(*[1.0] * _MOST_CHANNELS),
-        )
+        )  # fmt: skip
         # what is pointed at
-        self._parts = (parts, memories)
-        ceiling = np.tile(prior_stddev(measured.frequencies, 1.0) ** 2, (shape[0], 1))
-        self._shared.hold({"ceiling": ceiling, "exposure": self._exposure})
+        self._frame, self._told, self._common, self._typical = frame, told, common, typical
+        self._memories = memories
+        self._ceiling = np.tile(prior_stddev(measured.frequencies, 1.0) ** 2, (shape[0], 1))
+        self._shared.hold({"ceiling": self._ceiling, "exposure": self._exposure})
         self._at = ctypes.byref(self._shared)
         self._exposure_at = address(self._exposure, np.float64)
         self._exposure[:] = exposure
         _LIBRARY.begin(self._at, *self._read(measured), self._exposure_at)
+
+    def of_frequencies(self, measured: Lighting, exposure: Array) -> "FollowedLight":
+        """The same light with the frequencies of another estimate, more or fewer of the same sequence.
+
+        What both have goes on as it was; what is new begins with the estimate, to be taken in next.
+
+        Args: as for the constructor.
+        """
+        other = FollowedLight(measured, exposure)
+        for own, others in zip(self._memories, other._memories, strict=True):
+            others.adopt(own, other._ceiling)
+        other._common.adopt(self._common)
+        other._typical.adopt(self._typical)
+        for name in ("errors", "usual", "level_errors"):
+            setattr(other._shared, name, getattr(self._shared, name))
+        return other
 
     def follow(
         self, measured: Lighting | None, exposure: Array, dt: float, time_s: float, *, still: bool

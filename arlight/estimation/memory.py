@@ -20,6 +20,7 @@ _LIBRARY.memory_tell.argtypes = [ctypes.c_void_p, *([ctypes.c_double] * 3), *([c
 _LIBRARY.memory_averaged.restype = ctypes.c_double
 for _function in ("start", "predict", "free_level", "correct", "judge", "tell"):
     getattr(_LIBRARY, f"memory_{_function}").restype = None
+_RUNNING = ("growth", "weights", "squared_weights", "level_freed")
 _ARRAYS = ("values", "velocity", "variance", "cross", "moving", "corrected")
 
 
@@ -64,6 +65,20 @@ class FadingMemory:
         """Begin with values (c, n), their variance (c, n) and the spread (c, n) of velocities [1/s]."""
         arrays = (np.ascontiguousarray(array, float) for array in (values, variance, rate**2))
         _LIBRARY.memory_start(self._at, *(address(array, np.float64) for array in arrays))
+
+    def adopt(self, other: "FadingMemory", doubt: Array) -> None:
+        """Go on with the first numbers of another memory; where it has fewer, the present ones become doubtful.
+
+        Args:
+            other: of the same memory and trend.
+            doubt: (c, n) variance of the numbers that it does not have.
+        """
+        count = min(self.values.shape[1], other.values.shape[1])
+        self.variance[:, count:] = doubt[:, count:]
+        for name in _ARRAYS:
+            getattr(self, name)[:, :count] = getattr(other, name)[:, :count]
+        for name in _RUNNING:
+            setattr(self.shared, name, getattr(other.shared, name))
 
     def predict(self, dt: float, ceiling: Array) -> None:
         """Carry the state on by dt [s]; its variance grows up to `ceiling` (c, n) and no further."""

@@ -82,6 +82,13 @@ class TypicalError:
         """Begin with the covariance (c, n, n) of the frame's light, not relative."""
         _LIBRARY.typical_start(self._at, address(covariance, np.float64))
 
+    def adopt(self, other: "TypicalError") -> None:
+        """Go on with the first numbers of another; the rest is as the first frame had it."""
+        count = min(self.diagonal.shape[1], other.diagonal.shape[1])
+        self.covariance[:, :count, :count] = other.covariance[:, :count, :count]
+        self.diagonal[:, :count] = other.diagonal[:, :count]
+        self.shared.weight = other.shared.weight
+
     def average(self, covariance: Array, dt: float) -> None:
         """Take in the same dt [s] after the last frame; a less certain frame counts less."""
         _LIBRARY.typical_average(self._at, address(covariance, np.float64), dt)

@@ -377,13 +377,34 @@ def test_memory_laid_out_in_another_way_is_read_all_the_same():
         np.testing.assert_allclose(lights[1].coefficients, lights[0].coefficients, rtol=1e-9)
 
 
-def test_an_estimate_of_another_order_is_followed_anew():
+def filtered(orders):
+    """A filter's lightings where the frames are measured up to such orders, one after the other."""
     filter_, source = LightingFilter(), Source()
-    for frame in range(10):
-        filter_.update(source.measure(natural(3), frame * FRAME_S), frame * FRAME_S)
-    lower = source.measure(natural(3), 0.4).truncated(1)
-    np.testing.assert_array_equal(filter_.update(lower, 0.4).coefficients, lower.coefficients)
-    assert filter_.update(lower, 0.44).order == 1
+    times = np.arange(len(orders)) * FRAME_S
+    frames = [source.measure(natural(3), time_s).truncated(order) for order, time_s in zip(orders, times, strict=True)]
+    return [filter_.update(frame, time_s) for frame, time_s in zip(frames, times, strict=True)]
+
+
+def test_orders_that_are_measured_no_longer_leave_the_others_as_they_were():
+    cut = filtered([3] * 20 + [1] * 20)
+    low = filtered([1] * 40)[-1]
+    assert [light.order for light in cut] == [3] * 20 + [1] * 20
+    # what is left differs by what the errors' correlations with the others told
+    assert np.all(np.abs(cut[-1].coefficients - low.coefficients) < 0.5 * low.stddev)
+    np.testing.assert_allclose(cut[-1].stddev, low.stddev, rtol=0.25)
+
+
+def test_orders_that_are_measured_again_begin_with_the_frame_and_are_averaged():
+    lights = filtered([1] * 20 + [3] * 40)
+    fresh = filtered([3] * 60)
+    assert [light.order for light in lights[18:22]] == [1, 1, 3, 3]
+    np.testing.assert_allclose(lights[20].coefficients[:3], fresh[20].coefficients[:3], atol=3 * fresh[20].stddev.max())
+    high = slice(3, None)
+    truth = unpack_real(natural(3))[high]
+    first, last = (
+        np.sqrt(np.mean(np.abs(light.coefficients[high] - truth) ** 2)) for light in (lights[20], lights[-1])
+    )
+    assert last < 0.5 * first
 
 
 def test_an_estimate_whose_parts_do_not_fit_is_refused():
