@@ -102,11 +102,13 @@ static inline void draw_triangle(const Raster *r, const float *a, const float *b
     /* the body alone, or texture coordinates and gloss around it */
     int first = r->texture_place ? 0 : 1, last = r->texture_place ? 2 : 1;
     Four across[3], down[3];
+    float inverse = 1.0f / area, b_across = (y[2] - y[0]) * inverse, c_across = (y[1] - y[0]) * inverse;
+    float b_down = (x[2] - x[0]) * inverse, c_down = (x[1] - x[0]) * inverse;
     for (int k = first; k <= last; k++) {
         Four origin = *(const Four *)(a + 4 * k);
         Four to_b = *(const Four *)(b + 4 * k) - origin, to_c = *(const Four *)(c + 4 * k) - origin;
-        across[k] = (to_b * (y[2] - y[0]) - to_c * (y[1] - y[0])) / area;
-        down[k] = (to_c * (x[1] - x[0]) - to_b * (x[2] - x[0])) / area;
+        across[k] = to_b * b_across - to_c * c_across;
+        down[k] = to_c * c_down - to_b * b_down;
     }
     Picture picture = {0, 0, 0};
     if (r->texture_place)

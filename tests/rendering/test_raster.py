@@ -163,3 +163,42 @@ def test_a_refined_mesh_is_lit_by_its_coarse_vertices(camera, pose):
             renderer = RasterRenderer(mesh, transfer, nothing, 0.5, 0.0, 2, refinement=refinement)
         both.append(drawn(renderer, finer.mesh, camera, pose))
     np.testing.assert_allclose(both[0], both[1], atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_flat_and_far_reaching_triangles_cover_what_lies_between_their_edges(camera, looking_down, seed):
+    """Needles hardly a row high, corners far outside: against the sign of each edge, in whole numbers."""
+    rng = np.random.default_rng(seed)
+    pose, region = looking_down(0.0, 300.0), Region(40, 30, 140, 110)
+    # places on the grid of 1/256 sample that corners are kept on, in samples of the region
+    wide = rng.integers(-30_000 * 256, 30_000 * 256, (60, 3, 2))
+    flat = rng.integers([-90 * 256, 20 * 256], [190 * 256, 21 * 256 + 128], (60, 3, 2))
+    y, x = (256 * axis for axis in np.mgrid[0 : region.size[1], 0 : region.size[0]])
+    for corners in np.concatenate([wide, flat]).astype(np.int64):
+        a, b, c = corners
+        if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0:
+            b, c = c, b
+        inside = np.ones(x.shape, bool)
+        rim = np.zeros(x.shape, bool)
+        for start, end in ((a, b), (b, c), (c, a)):
+            side = (end[0] - start[0]) * (y - start[1]) - (end[1] - start[1]) * (x - start[0])
+            inside &= side < 0
+            rim |= side == 0
+        pixels = np.array([a, b, c]) / 256.0 + [region.x0, region.y0]
+        k = camera.camera_matrix
+        normalised = (pixels - k[:2, 2]) / [k[0, 0], k[1, 1]]
+        points = (np.column_stack([normalised, np.ones(3)]) * 300.0 - pose.translation) @ pose.rotation
+        mesh = Mesh(points, np.tile([0.0, 0, 1], (3, 1)), np.array([[0, 1, 2]], np.int32), np.ones((3, 3), np.float32))
+        covered = drawn(matte_renderer(mesh, 1.0), mesh, camera, pose, region=region)[..., 3] > 0.0
+        # single precision of the projection moves corners far outside by more than the grid
+        tolerated = rim if np.abs(corners).max() < 256 * 512 else rim | _near_an_edge(corners, x, y, 0.2 * 256)
+        assert np.array_equal(covered[~tolerated], inside[~tolerated])
+
+
+def _near_an_edge(corners, x, y, distance):
+    near = np.zeros(x.shape, bool)
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = (end - start).astype(float)
+        side = along[0] * (y - start[1]) - along[1] * (x - start[0])
+        near |= np.abs(side) < distance * np.hypot(*along)
+    return near
