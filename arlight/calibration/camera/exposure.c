@@ -1,10 +1,12 @@
 /* Level of the white paper in a picture, from encoded values at points of paper and wedge. */
+#include "paper_samples.h"
 #include "surface.h"
 
 enum { FEWEST = 40, FEWEST_SECTORS = 8 };
 
 typedef struct {
-    double *x;           /* (points) of the sheet, within [-1, 1] */
+    PaperPoints *points; /* of the sheet, and those that are found in a picture */
+    double *x;           /* (points) within [-1, 1] */
     double *y;
     double *ink;         /* (points) reflectance, 1 on paper */
     int32_t *wedge;      /* (points) whether it lies on the wedge */
@@ -12,9 +14,7 @@ typedef struct {
     double *mean;        /* (6) means of the surface's terms over all paper */
     double *vignetting;  /* (6) centre [px], 1 / (half a diagonal)^2 [px^-2], k1, k2, k3 */
     float *light;        /* (steps + 1) light of encoded values from 0 to 1 */
-    int32_t *place;      /* (most) points that are found in a picture */
-    int32_t *pixel;      /* (most, 2) their column and row [px] */
-    float *encoded;      /* (3, found) their R'G'B' */
+    float *encoded;      /* (3, most) scratch */
     double *gain;        /* (most) scratch, as all that follows */
     double *values;
     double *used_x;
@@ -34,8 +34,9 @@ typedef struct {
 static HOT void find_gains(const Meter *meter, int found)
 {
     const double *k = meter->vignetting;
+    const int32_t *restrict pixel = meter->points->pixel;
     for (int i = 0; i < found; i++) {
-        double x = meter->pixel[2 * i] - k[0], y = meter->pixel[2 * i + 1] - k[1], r2 = k[2] * (x * x + y * y);
+        double x = pixel[2 * i] - k[0], y = pixel[2 * i + 1] - k[1], r2 = k[2] * (x * x + y * y);
         meter->gain[i] = 1.0 + r2 * (k[3] + r2 * (k[4] + r2 * k[5]));
     }
 }
@@ -64,13 +65,13 @@ static Samples collect(const Meter *meter, int found)
 {
     int paper = 0, lost = 0, count = 0;
     for (int i = 0; i < found; i++) {
-        int blank = !meter->wedge[meter->place[i]];
+        int blank = !meter->wedge[meter->points->place[i]];
         paper += blank;
         lost += blank & clipped(meter, i);
     }
     int crowded = 2 * lost > paper;
     for (int i = 0; i < found; i++) {
-        int at = meter->place[i];
+        int at = meter->points->place[i];
         if (clipped(meter, i) || (meter->wedge[at] && !(crowded && meter->ink[at] > 0.0)))
             continue;
         meter->used_x[count] = meter->x[at];
@@ -101,10 +102,16 @@ static double quantisation(const Meter *meter, double level)
     return slope * meter->code * slope * meter->code / 12.0;
 }
 
-/* Levels of the three channels in out[0..2], nan where they cannot be told, their variances in out[3..5], and how many
-   samples had a say in out[6..8]. */
-EXPORT void measure(const Meter *meter, int found, double *out)
+/* Measures the level of the white paper in a picture of width x height pixels under camera_from_probe.
+
+   Gives the levels of the three channels in out[0..2], nan where they cannot be told, their variances in out[3..5], the
+   number of samples that had a say in out[6..8], and how many points of the sheet were looked at in out[9]. */
+EXPORT void measure(const Meter *meter, const struct layout *layout, const struct picture *picture, int width,
+                    int height, const double *rotation, const double *translation, double *out)
 {
+    int32_t looked;
+    int found = locate(meter->points, width, height, rotation, translation, &looked);
+    read_pixels(layout, picture, found, meter->points->pixel, meter->encoded);
     find_gains(meter, found);
     for (int c = 0; c < 3; c++) {
         decode(meter, found, meter->encoded + (int64_t)c * found);
@@ -117,4 +124,5 @@ EXPORT void measure(const Meter *meter, int found, double *out)
         out[3 + c] = level.variance + quantisation(meter, level.level);
         out[6 + c] = level.kept * samples.count;
     }
+    out[9] = looked;
 }

@@ -10,20 +10,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.camera.paper_samples import PaperSampler, read_encoded
+from arlight.calibration.camera.paper_samples import PaperSampler, readable_planes
 from arlight.camera import Camera, Pose
 from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
 from arlight.tracking.decoding import decoding
 from arlight.video.frame import Frame
+from arlight.video.layout import POINTERS, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import PixelFormat
 
 Array = NDArray[np.float64]
 
 _LIBRARY = library(__file__, "exposure")
-_LIBRARY.measure.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p]
+_LIBRARY.measure.argtypes = [
+    ctypes.c_void_p, POINTERS[Layout], POINTERS[PictureCodes], *([ctypes.c_int] * 2), *([ctypes.c_void_p] * 3),
+]  # fmt: skip
+_LIBRARY.measure.restype = None
 _SPACING_MM = 2.2
-_MOST_POINTS = 600
+_MOST_POINTS = 400
 """Pixels that are read: parts of the frame err together, so that more of each say nothing more."""
 
 
@@ -44,22 +48,20 @@ class PaperLevel:
         return bool(np.all(np.isfinite(self.level)))
 
 
-class _Workspace(Workspace):
+_SCRATCH = ("gain", "values", "used_x", "used_y", "used_ink", "used_light")
+
+
+class _Shared(Workspace):
     """What exposure.c calls Meter."""
 
     _fields_ = (
-        *(
-            (name, ctypes.c_void_p)
-            for name in (
-                "x", "y", "ink", "wedge", "sector", "mean", "vignetting", "light", "place", "pixel", "encoded", "gain",
-                "values", "used_x", "used_y", "used_ink", "used_light", "used_sector", "residual", "weight",
-                "bits",
-            )
-        ),
+        *((name, ctypes.c_void_p) for name in ("points", "x", "y", "ink", "wedge", "sector", "mean", "vignetting")),
+        *((name, ctypes.c_void_p) for name in ("light", "encoded", *_SCRATCH)),
+        *((name, ctypes.c_void_p) for name in ("used_sector", "residual", "weight", "bits")),
         ("steps", ctypes.c_int64),
         ("clip", ctypes.c_double),
         ("code", ctypes.c_double),
-    )  # fmt: skip
+    )
 
 
 class ExposureMeter:
@@ -76,14 +78,12 @@ class ExposureMeter:
     def __init__(self, probe: Probe, camera: Camera) -> None:
         self._camera = camera
         self._sampler = PaperSampler(probe, camera, _SPACING_MM, _MOST_POINTS)
-        scale = np.array(probe.sheet_mm) / 2.0
-        # the level is the mean over all of the paper, so that it does not depend on which of it is seen
-        mean = _surface(self._sampler.paper_mm / scale).mean(axis=0)
         self._paper_share = len(self._sampler.paper_mm) / len(self._sampler.points_mm)
         self._format: PixelFormat | None = None
-        self._encoded, self._results = np.zeros(3 * _MOST_POINTS, np.float32), np.zeros((3, 3))
+        self._shared = _shared(self._sampler, np.array(probe.sheet_mm) / 2.0, camera)
+        self._at = ctypes.byref(self._shared)
+        self._results = np.zeros(10)
         self._results_at = address(self._results, np.float64)
-        self._workspace = _shared(self._sampler, self._sampler.points_mm / scale, mean, camera, self._encoded)
 
     def measure(self, frame: Frame, pose: Pose) -> PaperLevel:
         """Level of the white paper, with its variance.
@@ -100,29 +100,31 @@ class ExposureMeter:
         """
         if frame.format is not self._format:
             self._decode(frame.format)
-        found, looked = self._sampler.locate(frame.size, pose)
-        read_encoded(frame, self._sampler.pixel[:found], self._encoded)
-        _LIBRARY.measure(ctypes.byref(self._workspace), found, self._results_at)
-        level, variance, counted = self._results.copy()
-        return PaperLevel(level, variance, min(float(counted.min()) / (looked * self._paper_share), 1.0))
+        rotation, translation = (np.ascontiguousarray(part, float) for part in (pose.rotation, pose.translation))
+        planes = readable_planes(frame)
+        _LIBRARY.measure(
+            self._at, layout_of(frame.size, frame.format), PictureCodes.of(planes), *frame.size,
+            address(rotation, np.float64), address(translation, np.float64), self._results_at,
+        )  # fmt: skip
+        level, variance, counted = self._results[:9].reshape(3, 3).copy()
+        share = min(counted.tolist()) / (float(self._results[9]) * self._paper_share)
+        return PaperLevel(level, variance, min(share, 1.0))
 
     def _decode(self, format_: PixelFormat) -> None:
         """Take over what the codes of a format stand for."""
         curve = decoding(format_.transfer, self._camera.radiometry)
-        self._workspace.hold({"light": np.ascontiguousarray(curve.light, np.float32)})
-        self._workspace.steps, self._workspace.clip = len(curve.light) - 1, curve.clip
-        self._workspace.code = 1.0 / format_.luma_code_range[1]
+        self._shared.hold({"light": np.ascontiguousarray(curve.light, np.float32)})
+        self._shared.steps, self._shared.clip = len(curve.light) - 1, curve.clip
+        self._shared.code = 1.0 / format_.luma_code_range[1]
         self._format = format_
 
 
-def _shared(
-    sampler: PaperSampler, places: Array, mean: Array, camera: Camera, encoded: NDArray[np.float32]
-) -> _Workspace:
-    x, y = places.T
+def _shared(sampler: PaperSampler, scale_mm: Array, camera: Camera) -> _Shared:
+    """What the compiled part reads, but for the codes' meaning, and its scratch memory."""
+    x, y = (sampler.points_mm / scale_mm).T
     half_diagonal_px = 0.5 * np.hypot(*camera.image_size)
     vignetting = [*camera.camera_matrix[:2, 2], half_diagonal_px**-2, *(camera.vignetting or (0.0, 0.0, 0.0))]
-    scratch = ("gain", "values", "used_x", "used_y", "used_ink", "used_light", "residual", "weight")
-    shared = _Workspace()
+    shared = _Shared(points=ctypes.addressof(sampler.shared))
     shared.hold(
         {
             "x": np.ascontiguousarray(x),
@@ -130,14 +132,12 @@ def _shared(
             "ink": np.ascontiguousarray(sampler.reflectance, float),
             "wedge": (sampler.patch >= 0).astype(np.int32),
             "sector": sampler.sector.astype(np.int32),
-            "mean": mean,
+            # the level is the mean over all of the paper, so that it does not depend on which of it is seen
+            "mean": _surface(sampler.paper_mm / scale_mm).mean(axis=0),
             "vignetting": np.array(vignetting),
-            "place": sampler.place,
-            "pixel": sampler.pixel,
-            "encoded": encoded,
-            **{name: np.zeros(len(sampler.place)) for name in scratch},
-            "used_sector": np.zeros(len(sampler.place), np.int32),
-            "bits": np.zeros(len(sampler.place), np.int32),
+            "encoded": np.zeros(3 * _MOST_POINTS, np.float32),
+            **{name: np.zeros(_MOST_POINTS) for name in (*_SCRATCH, "residual", "weight")},
+            **{name: np.zeros(_MOST_POINTS, np.int32) for name in ("used_sector", "bits")},
         }
     )
     return shared

@@ -17,21 +17,23 @@ from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
 from arlight.probe.frame_layout import window_mm
 from arlight.tracking.lens import camera_parameters
+from arlight.video.conversion import Planes
 from arlight.video.frame import Frame
 from arlight.video.layout import POINTERS, Layout, PictureCodes, layout_of
 
 Array = NDArray[np.float64]
 
-_LIBRARY = library(__file__, "paper_samples")
-_LIBRARY.locate.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
+_LIBRARY = library(__file__, "exposure")
+_LIBRARY.locate.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, *([ctypes.c_void_p] * 3)]
 _LIBRARY.read_pixels.argtypes = [POINTERS[Layout], POINTERS[PictureCodes], ctypes.c_int, *([ctypes.c_void_p] * 2)]
+_LIBRARY.read_pixels.restype = None
 
 _EDGE_PX = 3.0
 """Distance to keep from ink and edges for the blur, the pixel's square and chroma stored at half resolution [px]."""
 _LEAST_EDGE_MM = 0.8
 _LEAST_PIXELS = 40
 _CHUNK = 64
-"""Points that are looked at together (paper_samples.c)."""
+"""Points that are looked at together (paper_samples.h)."""
 SECTORS = 24
 """Parts of the frame, by the angle at the sheet's centre."""
 
@@ -54,12 +56,16 @@ class PaperSamples:
     """(n,) number of the part of the frame; pixels of one part share their errors."""
 
 
-class _Workspace(Workspace):
-    """What paper_samples.c calls PaperPoints."""
+class _Shared(Workspace):
+    """What paper_samples.h calls PaperPoints."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("count", "width", "height")),
-        *((name, ctypes.c_void_p) for name in ("x", "y", "clearance", "lens", "pose", "place", "pixel")),
+        ("count", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("x", "y", "clearance")),
+        ("edge_px", ctypes.c_double),
+        ("lens", ctypes.c_void_p),
+        ("most", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("place", "pixel")),
     )
 
 
@@ -103,7 +109,10 @@ class PaperSampler:
         angle = np.arctan2(self.points_mm[:, 1], self.points_mm[:, 0])
         self.sector = np.floor((angle / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
         """(n,) the part of the frame that they lie in."""
-        self._most = len(order) if most is None else most
+        self._place = np.zeros(len(order) if most is None else most, np.int32)
+        self._pixel = np.zeros((len(self._place), 2), np.int32)
+        self.shared = _Shared(len(order), edge_px=_EDGE_PX, most=len(self._place))
+        """The compiled part's view of it."""
         self._share(np.concatenate(clearance)[order], camera)
 
     def _share(self, clearance: Array, camera: Camera) -> None:
@@ -111,40 +120,13 @@ class PaperSampler:
         count = len(self.points_mm)
         padded = np.full((3, -(-count // _CHUNK) * _CHUNK), -1.0, np.float32)
         padded[:2, :count], padded[2, :count] = self.points_mm.T, clearance
-        self.place = np.zeros(self._most, np.int32)
-        """(most,) numbers of the points that the last picture shows, as many as `locate` told."""
-        self.pixel = np.zeros((self._most, 2), np.int32)
-        """(most, 2) their columns and rows in it [px]."""
-        self._pose, self._looked = np.zeros(12), ctypes.c_int32()
-        self._workspace = _Workspace(count)
-        x, y, clearance = padded
-        self._workspace.hold(
-            {
-                "x": x, "y": y, "clearance": clearance, "lens": camera_parameters(camera), "pose": self._pose,
-                "place": self.place, "pixel": self.pixel,
-            }
-        )  # fmt: skip
+        places = dict(zip(("x", "y", "clearance"), padded, strict=True))
+        self.shared.hold({**places, "lens": camera_parameters(camera), "place": self._place, "pixel": self._pixel})
 
     @property
     def paper_mm(self) -> Array:
         """(m, 2) the points of blank paper that are sampled where they can be seen [mm]."""
         return self.points_mm[self.patch < 0]
-
-    def locate(self, size: tuple[int, int], pose: Pose) -> tuple[int, int]:
-        """Find the points that a picture of `size` (w, h) [px] shows clear of all print, into `place` and `pixel`.
-
-        Args:
-            size: of the picture [px].
-            pose: camera_from_probe.
-
-        Returns:
-            How many there are, and how many were looked at until those were found.
-        """
-        self._workspace.width, self._workspace.height = size
-        self._pose[:9], self._pose[9:] = pose.rotation.ravel(), pose.translation
-        shared, looked = ctypes.byref(self._workspace), ctypes.byref(self._looked)
-        found = _LIBRARY.locate(shared, _EDGE_PX, self._most, looked)
-        return found, self._looked.value
 
     def sample(self, frame: Frame, pose: Pose) -> PaperSamples:
         """Paper and wedge as one picture shows them; empty where they are out of it or too small in it.
@@ -153,32 +135,38 @@ class PaperSampler:
             frame: the picture; its size is the camera's.
             pose: camera_from_probe.
         """
-        found, _ = self.locate(frame.size, pose)
-        kept, pixels = self.place[:found], self.pixel[:found].copy()
+        looked = ctypes.c_int32()
+        rotation, translation = (np.ascontiguousarray(part, float) for part in (pose.rotation, pose.translation))
+        found = _LIBRARY.locate(
+            ctypes.byref(self.shared), *frame.size, address(rotation, np.float64), address(translation, np.float64),
+            ctypes.byref(looked),
+        )  # fmt: skip
+        kept, pixels = self._place[:found], self._pixel[:found].copy()
         return PaperSamples(
             self.points_mm[kept], pixels, read_encoded(frame, pixels), self.reflectance[kept], self.patch[kept],
             self.sector[kept],
         )  # fmt: skip
 
 
-def read_encoded(
-    frame: Frame, pixels: NDArray[np.integer[Any]], out: NDArray[np.float32] | None = None
-) -> NDArray[np.float32]:
+def read_encoded(frame: Frame, pixels: NDArray[np.integer[Any]]) -> NDArray[np.float32]:
     """Encoded R'G'B' (n, 3) of single pixels (n, 2), chroma as its nearest sample has it; clamped to [0, 1].
 
     Args:
         frame: the picture.
         pixels: columns and rows inside it [px].
-        out: room for 3 n numbers, where they are written one channel after the other; new by default.
     """
-    count, pixels = len(pixels), np.ascontiguousarray(pixels, np.int32)
-    out = np.empty(3 * count, np.float32) if out is None else out
-    planes = [plane if plane.strides[1] == plane.itemsize else plane.copy() for plane in frame.planes]
+    places, out = np.ascontiguousarray(pixels, np.int32), np.empty((3, len(pixels)), np.float32)
+    planes = readable_planes(frame)
     _LIBRARY.read_pixels(
-        layout_of(frame.size, frame.format), PictureCodes.of(planes), count, address(pixels, np.int32),
+        layout_of(frame.size, frame.format), PictureCodes.of(planes), len(places), address(places, np.int32),
         address(out, np.float32),
     )  # fmt: skip
-    return out[: 3 * count].reshape(3, count).T
+    return out.T
+
+
+def readable_planes(frame: Frame) -> Planes:
+    """A frame's planes with contiguous rows, as compiled code reads them."""
+    return tuple(plane if plane.strides[1] == plane.itemsize else plane.copy() for plane in frame.planes)
 
 
 def _blank_paper(probe: Probe, squares: list[Array], spacing_mm: float) -> tuple[Array, Array]:

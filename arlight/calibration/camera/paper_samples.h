@@ -1,4 +1,7 @@
-/* Pixels of a sheet's paper: which of its points a picture shows well, and the codes there. */
+/* Pixels of a sheet's paper: which of its points a picture shows well, and their colour. */
+#ifndef ARLIGHT_PAPER_SAMPLES_H
+#define ARLIGHT_PAPER_SAMPLES_H
+
 #include "../../tracking/lens.h"
 #include "../../video/picture.h"
 
@@ -7,13 +10,12 @@ enum { CHUNK = 64 };
 
 typedef struct {
     int64_t count;      /* points of the sheet */
-    int64_t width;      /* of the picture [px] */
-    int64_t height;
     float *x;           /* (count, rounded up to whole chunks) [mm] */
     float *y;
     float *clearance;   /* how far each point is from ink and edges [mm]; -1 beyond count */
+    double edge_px;     /* distance to keep from all that [px] */
     double *lens;       /* (25) `camera_parameters` */
-    double *pose;       /* (12) rotation and translation of camera_from_probe [mm] */
+    int64_t most;       /* points that suffice */
     int32_t *place;     /* (most) number of each point that is found */
     int32_t *pixel;     /* (most, 2) its column and row [px] */
 } PaperPoints;
@@ -22,23 +24,24 @@ typedef struct {
     float right[3], up[3], origin[3]; /* the sheet's axes and origin as the camera has them */
 } Axes;
 
-static Axes axes_of(const double *pose)
+static Axes axes_of(const double *rotation, const double *translation)
 {
     Axes axes;
     for (int k = 0; k < 3; k++) {
-        axes.right[k] = (float)pose[3 * k];
-        axes.up[k] = (float)pose[3 * k + 1];
-        axes.origin[k] = (float)pose[9 + k];
+        axes.right[k] = (float)rotation[3 * k];
+        axes.up[k] = (float)rotation[3 * k + 1];
+        axes.origin[k] = (float)translation[k];
     }
     return axes;
 }
 
-/* Pixels of a chunk of points, moved to (-1, -1) where it is not `edge` pixels from everything that is not paper. */
-static HOT void project_chunk(const PaperPoints *points, const Lens *lens, const Axes *axes, int first, float edge,
+/* Pixels of a chunk of points, moved to (-1, -1) where they are too close to what is not paper. */
+static HOT void project_chunk(const PaperPoints *points, const Lens *lens, const Axes *axes, int first,
                               float *restrict column, float *restrict row)
 {
     const float *restrict xs = points->x + first, *restrict ys = points->y + first;
     const float *restrict clearance = points->clearance + first;
+    float edge = (float)points->edge_px;
     Axes a = *axes;
     Lens l = *lens;
     for (int i = 0; i < CHUNK; i++) {
@@ -58,17 +61,18 @@ static HOT void project_chunk(const PaperPoints *points, const Lens *lens, const
     }
 }
 
-/* Finds up to `most` points that are shown clear of everything by `edge` pixels; returns how many, and in `looked` how
-   many points it has looked at. */
-EXPORT int locate(const PaperPoints *points, double edge, int most, int32_t *looked)
+/* Finds points that a picture of width x height pixels shows clear of everything, under camera_from_probe; returns how
+   many, and in `looked` how many points it has looked at. */
+EXPORT int locate(const PaperPoints *points, int width, int height, const double *rotation, const double *translation,
+                  int32_t *looked)
 {
-    float column[CHUNK], row[CHUNK], right = (float)points->width - 1.5f, bottom = (float)points->height - 1.5f;
+    float column[CHUNK], row[CHUNK], right = (float)width - 1.5f, bottom = (float)height - 1.5f;
     Lens lens = lens_of(points->lens);
-    Axes axes = axes_of(points->pose);
-    int found = 0;
+    Axes axes = axes_of(rotation, translation);
+    int found = 0, most = (int)points->most;
     *looked = 0;
     for (int first = 0; first < points->count && found < most; first += CHUNK) {
-        project_chunk(points, &lens, &axes, first, (float)edge, column, row);
+        project_chunk(points, &lens, &axes, first, column, row);
         for (int i = 0; i < CHUNK && first + i < points->count && found < most; i++) {
             *looked = first + i + 1;
             /* not on the picture's border; nan is nowhere */
@@ -112,3 +116,5 @@ EXPORT void read_pixels(const struct layout *layout, const struct picture *pictu
         }
     }
 }
+
+#endif
