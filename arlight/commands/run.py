@@ -73,7 +73,8 @@ def _prepare(options: RunOptions, footage: Footage) -> dict[str, Output]:
 def _pipeline(options: RunOptions, footage: Footage) -> Pipeline:
     probe, camera, order = footage.probe, footage.camera, options.order
     relighter = make_relighter(options.relighting, probe, camera, order) if options.render else None
-    return Pipeline(probe, camera, relighter, TrackerSettings(order=order), footage.assembly, footage.fixed)
+    settings = TrackerSettings() if order is None else TrackerSettings(order=order)
+    return Pipeline(probe, camera, relighter, settings, footage.assembly, footage.fixed)
 
 
 def _process(
