@@ -12,6 +12,7 @@ from arlight.rendering.default_object import default_object
 from arlight.rendering.mesh import Mesh
 from arlight.rendering.relight import Relighter
 from arlight.rendering.settings import RelightSettings
+from arlight.rendering.transfer_cache import user_cache_folder
 from arlight.video.frame import Frame
 
 
@@ -41,7 +42,9 @@ class _PreparedRelighter:
 
     def __init__(self, mesh: Mesh, probe: Probe, camera: Camera, settings: RelightSettings, order: int | None) -> None:
         thread = ThreadPoolExecutor(1, "prepare")
-        self._made = thread.submit(Relighter, mesh, probe, camera, settings, order=order)
+        self._made = thread.submit(
+            Relighter, mesh, probe, camera, settings, order=order, cache_folder=user_cache_folder()
+        )
         thread.shutdown(wait=False)
 
     def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:

@@ -1,6 +1,7 @@
 """Lights an object on the sheet with estimated coefficients and sets it into the frame."""
 
 from functools import cached_property
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.refinement import refined
 from arlight.rendering.settings import RelightSettings
 from arlight.rendering.shadow import dark_texels, irradiance_ratio
-from arlight.rendering.transfer import precompute_transfer
+from arlight.rendering.transfer_cache import kept_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
 
@@ -69,6 +70,7 @@ class Relighter:
         settings: RelightSettings | None = None,
         progress: Progress | None = None,
         order: int | None = None,
+        cache_folder: Path | None = None,
     ) -> None:
         """Cast the object's shadows and fold them into matrices.
 
@@ -79,6 +81,7 @@ class Relighter:
             settings: placement, material, sampling.
             progress: called with the share of the precomputation done, from 0 to 1.
             order: highest order of the lightings to come, as in `TrackerSettings`; the sheet's by default.
+            cache_folder: where the object's shadows are kept from one time to the next; None keeps nothing.
 
         Raises:
             MeshError: the object cannot be placed.
@@ -92,7 +95,9 @@ class Relighter:
         self._frequencies = frequencies if order is None else frequencies[orders_up_to(frequencies, order)]
         self.mesh = self._fitted(mesh).placed(s.size_mm, s.position_mm, s.yaw_deg)
         self._reconstruction = reconstruct(probe.slab, self._frequencies, s.surroundings_albedo)
-        self.transfer = precompute_transfer(self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress)
+        self.transfer = kept_transfer(
+            cache_folder, self.mesh, self._reconstruction, s.directions, s.shadow_texels, progress
+        )
         shadow = self.transfer.shadow
         self._plane_rows = LightRows([shadow.hidden_rows, shadow.open_row[None]], self._reconstruction.independent)
         self._plane_shader = PlaneShader(camera, shadow.grid)

@@ -28,9 +28,10 @@ class Finished:
 
 
 @pytest.fixture
-def arlight(capsys, monkeypatch, tmp_path):
-    """Runs the command line in an empty folder."""
+def arlight(capsys, monkeypatch, tmp_path, tmp_path_factory):
+    """Runs the command line in an empty folder, its caches apart from the user's."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
 
     def run(*arguments: object) -> Finished:
         status = main([str(argument) for argument in arguments])
