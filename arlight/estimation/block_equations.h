@@ -4,33 +4,38 @@
 
 #include "row_model.h"
 
-/* Products in GRAM: of the columns among each other (00, 01, 11, 02, 12, 22), of the mirror with the columns and
-   itself, and of the values with columns and mirror. */
+/* Products in GRAM: of the columns among each other (00, 01, 11, 02, 12, 22), of the field with the columns and itself,
+   and of the values with columns and field. A field of 1 is mirrored as strongly as `face` says. */
 enum { WITH_MIRROR = 6, MIRROR_SQUARE = 9, VALUES = 10, VALUES_MIRROR = 13 };
 
-/* Inverse of four covariance matrices, lower triangles in place. */
+/* Inverse of four covariance matrices, lower triangles in place: factors L D L', without roots, which take long. */
 INLINE void invert(lanes *a)
 {
-    /* factor L, then its inverse, then the product of the inverse with itself */
-    for (int r = 0; r < ROWS; r++)
-        for (int s = 0; s <= r; s++) {
-            lanes sum = a[PAIR[r][s]];
+    lanes reciprocal[ROWS];
+    for (int r = 0; r < ROWS; r++) {
+        lanes scaled[ROWS], pivot = a[PAIR[r][r]];
+        for (int s = 0; s < r; s++) {
+            scaled[s] = a[PAIR[r][s]];
             for (int k = 0; k < s; k++)
-                sum -= a[PAIR[r][k]] * a[PAIR[s][k]];
-            a[PAIR[r][s]] = r == s ? 1.0 / root(sum) : sum * a[PAIR[s][s]];
+                scaled[s] -= scaled[k] * a[PAIR[s][k]];
+            a[PAIR[r][s]] = scaled[s] * reciprocal[s];
+            pivot -= scaled[s] * a[PAIR[r][s]];
         }
+        reciprocal[r] = 1.0 / pivot;
+    }
+    /* the factor's inverse, below a diagonal of ones */
     for (int s = 0; s < ROWS; s++)
         for (int r = s + 1; r < ROWS; r++) {
-            lanes sum = a[PAIR[r][s]] * a[PAIR[s][s]];
+            lanes sum = a[PAIR[r][s]];
             for (int k = s + 1; k < r; k++)
                 sum += a[PAIR[r][k]] * a[PAIR[k][s]];
-            a[PAIR[r][s]] = -sum * a[PAIR[r][r]];
+            a[PAIR[r][s]] = -sum;
         }
     for (int r = 0; r < ROWS; r++)
         for (int s = 0; s <= r; s++) {
-            lanes sum = splat(0.0);
-            for (int k = r; k < ROWS; k++)
-                sum += a[PAIR[k][r]] * a[PAIR[k][s]];
+            lanes sum = r == s ? reciprocal[r] : reciprocal[r] * a[PAIR[r][s]];
+            for (int k = r + 1; k < ROWS; k++)
+                sum += reciprocal[k] * a[PAIR[k][r]] * a[PAIR[k][s]];
             a[PAIR[r][s]] = sum;
         }
 }
@@ -38,7 +43,7 @@ INLINE void invert(lanes *a)
 /* Precision of four blocks' rows without lamps: of the usable ones, weighted, and 0 elsewhere. */
 INLINE void row_precision(const ChannelFit *f, int64_t b, lanes *p)
 {
-    lanes noise = at(f, NOISE, b), trust = at(f, TRUST, b), weight = root(load(f->weight + b)), counts[HARMONICS + 1];
+    lanes noise = at(f, NOISE, b), trust = at(f, TRUST, b), weight = load(f->weight + b), counts[HARMONICS + 1];
     for (int h = 0; h <= HARMONICS; h++)
         counts[h] = at(f, USABLE + h, b);
     for (int r = 0; r < ROWS; r++)
@@ -55,8 +60,8 @@ INLINE void row_precision(const ChannelFit *f, int64_t b, lanes *p)
     invert(p);
     for (int r = 0; r < ROWS; r++)
         for (int s = 0; s <= r; s++) {
-            lanes row = r ? trust * weight : weight, column = s ? trust * weight : weight;
-            p[PAIR[r][s]] *= counts[harmonic_of_row(r)] * row * counts[harmonic_of_row(s)] * column;
+            lanes seen = s ? trust * trust * weight : r ? trust * weight : weight;
+            p[PAIR[r][s]] *= counts[harmonic_of_row(r)] * counts[harmonic_of_row(s)] * seen;
         }
 }
 
@@ -112,6 +117,8 @@ static HOT void block_equations(const ChannelFit *f)
         row_precision(f, b, p);
         load_rows(f, MIRROR, b, mirror);
         eliminate_lamp(f, b, p, mirror);
+        for (int r = 0; r < ROWS; r++)
+            mirror[r] *= load(m->face + b);
         for (int i = 0; i < PAIRS; i++)
             put(f, PRECISION + i, b, p[i]);
         for (int r = 0; r < ROWS; r++)

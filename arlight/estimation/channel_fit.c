@@ -18,7 +18,7 @@ static HOT void predict(const ChannelFit *f, double mean)
         lit_rows(f, b, mean, rows);
         for (int r = 0; r < ROWS; r++)
             store(f->predicted + (f->channel * ROWS + r) * n + b, rows[r] + at(f, MIRROR + r, b) * extra);
-        store(f->reflection + f->channel * n + b, at(f, FIELD, b) + extra);
+        store(f->reflection + f->channel * n + b, at(f, FIELD, b) * load(f->m->face + b) + extra);
     }
 }
 
@@ -71,15 +71,12 @@ EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t 
     row_noise(f);
     expect_lamps(f);
     expect_light(f);
-    if (channel == GREEN)
-        expect_field(f);
-    else
-        expect_pattern(f);
+    expect_pattern(f);
     for (int64_t pass = 0; pass < passes; pass++) {
         row_model(f);
         block_equations(f);
         solve_shared(f, packed);
-        residuals(f, packed[0], 0);
+        miss(f, packed[0], 0);
         if (settle || pass == passes - 1)
             step_nuisance(f, packed, &step);
         reweigh(f);

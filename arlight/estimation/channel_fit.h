@@ -19,8 +19,8 @@ typedef struct {
     const double *spread;   /* (2k - 1) prior deviation of the coefficients for an irradiance of 1, the first as it is */
     const double *colorful; /* (2k - 1) the same of red's and blue's difference from green */
     const double *mean_model;  /* (stride) deviation of the model's error in the means, relative to white */
-    const double *basis;    /* (stride, width) reflection field of each block, before Fresnel's factor */
-    const double *basis_planes; /* (field, stride) the same, one plane an amplitude */
+    double *basis;          /* (stride, width) reflection field of each block, before Fresnel's factor */
+    double *basis_planes;   /* (field, stride) the same, one plane an amplitude */
     const double *rows;     /* (3, 7, stride) response before blur */
     const double *lower;    /* (7, stride) of the lower face */
     double white_per_irradiance;
@@ -40,8 +40,6 @@ typedef struct {
     double *reflection;     /* (3, stride) */
     double *predicted;      /* (3, 7, stride) */
     double *planes;         /* (PLANES, stride) see below */
-    double *field_rows;     /* (stride, width) basis as it is mirrored toward this camera */
-    double *field_planes;   /* (field, stride) the same */
     double *shared;         /* (width, width) equations of the shared unknowns */
     double *stacked;        /* (stride + 8, width) rows whose products they are */
     double *frequency;      /* (frequencies + 1, FREQUENCY) what each frequency's own equations leave */
@@ -76,15 +74,14 @@ enum {
     PRECISION = MIRROR + ROWS,         /* 28: of the rows when a lamp may be mirrored */
     TELLING = PRECISION + PAIRS,       /* 7: how the rows tell of a lamp */
     SPREAD = TELLING + ROWS,           /* variance with which a lamp is told */
-    WEIGHTED = SPREAD + 1,             /* 4 x 7: precision times the response's columns and the mirror */
-    GRAM = WEIGHTED + 4 * ROWS,        /* 14: products of columns, mirror and values, see block_equations.h */
-    FIELD = GRAM + 14,                 /* reflection */
+    WEIGHTED = SPREAD + 1,             /* 4 x 7: precision times the columns of the response and of the field */
+    GRAM = WEIGHTED + 4 * ROWS,        /* 14: products of columns, field and values, see block_equations.h */
+    FIELD = GRAM + 14,                 /* reflection, before Fresnel's factor */
     REAL = FIELD + 1,                  /* coefficient of the block's frequency */
     IMAGINARY = REAL + 1,
     MISSED = IMAGINARY + 1,            /* 7: measured less light and field */
     EXTRA = MISSED + ROWS,             /* what a block mirrors by itself */
-    SQUARED = EXTRA + 1,               /* 7: residuals, squared, relative to their variances */
-    SLOPES = SQUARED + ROWS,           /* 5 x 7: change of the rows with the nuisance */
+    SLOPES = EXTRA + 1,                /* 5 x 7: change of the rows with the nuisance */
     CROSS = SLOPES + NUISANCES * ROWS, /* 4 x 5: their products with columns and mirror */
     SHARES = CROSS + 4 * NUISANCES,    /* 2: how Re and Im of the block's frequency move with its field */
     BLOCK = SHARES + 2,                /* 10: covariance of L_0, Re, Im and field */

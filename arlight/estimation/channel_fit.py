@@ -40,8 +40,7 @@ class _ChannelFit(Workspace):
         *((name, ctypes.c_double) for name in ("white_per_irradiance", "lamp_freedom", "weight_freedom", "weakest")),
         *((name, ctypes.c_void_p) for name in ("nuisances", "scales", "spreads", "lamps", "weights")),
         *((name, ctypes.c_void_p) for name in ("nuisance", "scale", "lamp", "weight", "packed", "covariance")),
-        *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "field_rows", "field_planes")),
-        *((name, ctypes.c_void_p) for name in ("shared", "stacked")),
+        *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "shared", "stacked")),
         *((name, ctypes.c_void_p) for name in ("frequency", "expected", "certain", "solution", "carried")),
         *((name, ctypes.c_void_p) for name in ("carried_light", "fields", "certainty", "products", "small")),
         *((name, ctypes.c_double) for name in ("chi2", "unexplained")),
@@ -123,20 +122,21 @@ class SheetFit:
         )  # fmt: skip
         self.native.hold({
             "first": self._first.astype(np.int32), "spread": prior_stddev(frequencies, 1.0),
-            "colorful": color_stddev(frequencies, 1.0, 1.0), "mean_model": model, "basis": rows,
-            "basis_planes": np.ascontiguousarray(rows[:, :field].T), "rows": response.rows, "lower": response.mirror, "nuisances": self.nuisances, "scales": self.scales,
-            "spreads": self.spreads, "lamps": self.lamps, "weights": self.weights, "reflection": self.reflection,
-            "predicted": self.predicted,
+            "colorful": color_stddev(frequencies, 1.0, 1.0), "mean_model": model,
+            "basis": rows, "basis_planes": np.ascontiguousarray(rows[:, :field].T),
+            "rows": response.rows, "lower": response.mirror,
+            "nuisances": self.nuisances, "scales": self.scales, "spreads": self.spreads, "lamps": self.lamps,
+            "weights": self.weights, "reflection": self.reflection, "predicted": self.predicted,
         })  # fmt: skip
         self._pointer = ctypes.byref(self.native)
-        self._make_room(stride, width, field)
+        self._make_room(stride, width)
 
-    def _make_room(self, stride: int, width: int, field: int) -> None:
+    def _make_room(self, stride: int, width: int) -> None:
         unknown = 2 * len(self._frequencies) - 1
         wide, most = _whole(unknown), int(np.diff(self._first).max(initial=1))
         shapes = {
-            "planes": (_PLANES, stride), "field_rows": (stride, width), "field_planes": (field, stride), "shared": (width, width),
-            "stacked": (stride + 8, width), "frequency": (len(self._frequencies) + 1, _FREQUENCY),
+            "planes": (_PLANES, stride), "shared": (width, width), "stacked": (stride + 8, width),
+            "frequency": (len(self._frequencies) + 1, _FREQUENCY),
             "expected": (wide,), "certain": (wide,), "solution": (width,), "carried": (width, _WIDE),
             "carried_light": (wide + 1, _WIDE), "fields": (width, stride), "certainty": (width + 8, wide),
             "products": (wide, wide), "small": (most + 8, most + 8),

@@ -40,32 +40,20 @@ static double spread_of_colors(const ChannelFit *f, const double *packed)
     return next_color_spread(n, f->colorful, packed[0], f->expected, variance, n + 1, f->spreads[f->channel]);
 }
 
-/* The field's basis as the camera sees it in this frame. */
-static HOT void expect_field(const ChannelFit *f)
-{
-    const MeasuredBlocks *m = f->m;
-    for (int64_t i = 0; i < m->blocks; i++)
-        for (int64_t c = 0; c < f->width; c += LANES)
-            store(f->field_rows + i * f->width + c, load(f->basis + i * f->width + c) * m->face[i]);
-    for (int64_t j = 0; j < f->field; j++)
-        for (int64_t b = 0; b < m->stride; b += LANES)
-            store(f->field_planes + j * m->stride + b, load(f->basis_planes + j * m->stride + b) * load(m->face + b));
-}
-
-/* Red and blue have green's whole reflection for a pattern of their field. */
+/* Red and blue have green's whole reflection for a pattern of their field; green has none. */
 static void expect_pattern(const ChannelFit *f)
 {
     const MeasuredBlocks *m = f->m;
     const double *green = f->reflection + GREEN * m->stride;
-    double *pattern = f->field_planes + (f->field - 1) * m->stride, sum = 0.0, squares = 0.0;
+    double *pattern = f->basis_planes + (f->field - 1) * m->stride, sum = 0.0, squares = 0.0;
     for (int64_t i = 0; i < m->blocks; i++)
         sum += green[i];
     const double mean = sum / (double)m->blocks;
     for (int64_t i = 0; i < m->blocks; i++)
         squares += (green[i] - mean) * (green[i] - mean);
-    const double scale = 1.0 / fmax(sqrt(squares / (double)m->blocks), 1e-6);
+    const double scale = f->channel == GREEN ? 0.0 : 1.0 / fmax(sqrt(squares / (double)m->blocks), 1e-6);
     for (int64_t i = 0; i < m->blocks; i++)
-        f->field_rows[i * f->width + f->field - 1] = pattern[i] = scale * green[i];
+        f->basis[i * f->width + f->field - 1] = pattern[i] = scale * green[i] / m->face[i];
 }
 
 /* Usual variance of what a block mirrors by itself beside the field, a part of the means' errors. */

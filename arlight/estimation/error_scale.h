@@ -26,7 +26,7 @@ typedef struct {
 } Judged;
 
 /* Covariance of one frequency's blocks' unknowns, given `between`, that of their fields. */
-static void group_covariance(const ChannelFit *f, int64_t g, const double *between, int64_t stride)
+INLINE void group_covariance(const ChannelFit *f, int64_t g, const double *between, int64_t stride)
 {
     const int64_t from = f->first[g], blocks = f->first[g + 1] - from;
     const double *own = of_frequency(f, g), *last = f->fields + f->field * f->m->stride;

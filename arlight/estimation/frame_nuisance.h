@@ -25,7 +25,7 @@ typedef struct {
 INLINE void slopes_of_rows(const ChannelFit *f, int64_t b, double mean, lanes slopes[NUISANCES][ROWS])
 {
     const MeasuredBlocks *m = f->m;
-    lanes rows[ROWS], extra = at(f, EXTRA, b), mirrored = at(f, FIELD, b);
+    lanes rows[ROWS], extra = at(f, EXTRA, b), mirrored = at(f, FIELD, b) * load(m->face + b);
     lit_rows(f, b, mean, rows);
     /* only what stands out of the noise can tell how the lower face mirrors it */
     mirrored += extra * extra * extra / larger(extra * extra + at(f, SPREAD, b), splat(1e-30));
@@ -125,7 +125,7 @@ static HOT void shared_slopes(const ChannelFit *f, Step *s)
         for (int k = 0; k < WIDE; k++)
             sum[k] = splat(0.0);
         for (int64_t i = 0; i < f->m->blocks; i++) {
-            lanes row = load(f->field_rows + i * f->width + j);
+            lanes row = load(f->basis + i * f->width + j);
             for (int k = 0; k < NUISANCES; k++)
                 sum[k] += cross(f, COLUMNS, k, i) * row;
         }
@@ -153,7 +153,7 @@ static HOT void carry_frequency(const ChannelFit *f, int64_t g)
         /* products of the frequency's columns with four amplitudes of the field */
         lanes with[2] = {splat(0.0), splat(0.0)};
         for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-            lanes row = load(f->field_rows + i * f->width + j);
+            lanes row = load(f->basis + i * f->width + j);
             with[0] += real[i] * row;
             with[1] += imaginary[i] * row;
         }
@@ -243,7 +243,7 @@ static HOT void step_nuisance(const ChannelFit *f, double *packed, Step *s)
     }
     field_of_blocks(f);
     coefficients_of_blocks(f, packed);
-    residuals(f, packed[0], s->step);
+    miss(f, packed[0], s->step);
 }
 
 #endif

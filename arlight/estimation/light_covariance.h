@@ -15,7 +15,7 @@ static HOT void whiten_fields(const ChannelFit *f)
     const int64_t n = f->m->stride, columns = (f->m->blocks + 2 * LANES - 1) / (2 * LANES) * (2 * LANES);
     for (int64_t j = 0; j <= f->field; j++)
         for (int64_t b = 0; b < columns; b += LANES)
-            store(f->fields + j * n + b, j < f->field ? load(f->field_planes + j * n + b) : splat(0.0));
+            store(f->fields + j * n + b, j < f->field ? load(f->basis_planes + j * n + b) : splat(0.0));
     substitute_forward(f->field + 1, f->shared, f->width, f->fields, n, columns);
 }
 

@@ -15,7 +15,7 @@ INLINE double gram(const ChannelFit *f, int64_t number, int64_t block) { return 
 INLINE double *of_frequency(const ChannelFit *f, int64_t g) { return f->frequency + g * FREQUENCY; }
 
 /* Inverts a frequency's own equations and keeps their products with L_0 and with the values. */
-static void solve_frequency(const ChannelFit *f, int64_t g)
+INLINE void solve_frequency(const ChannelFit *f, int64_t g)
 {
     double *own = of_frequency(f, g), a = f->certain[2 * g - 1], b = 0.0, c = f->certain[2 * g], mean[2] = {0, 0};
     double values[2] = {a * f->expected[2 * g - 1], c * f->expected[2 * g]};
@@ -46,7 +46,7 @@ INLINE double through(const double *own, const double *x, const double *y)
 }
 
 /* Equations of some blocks' field values, L_0 and the right-hand side, rows of n + 2, their frequency eliminated. */
-static void reduce_group(const ChannelFit *f, int64_t from, int64_t n, const double *own, double *k)
+INLINE void reduce_group(const ChannelFit *f, int64_t from, int64_t n, const double *own, double *k)
 {
     int64_t w = n + 2;
     for (int64_t i = 0; i < w * w; i++)
@@ -75,7 +75,7 @@ static void reduce_group(const ChannelFit *f, int64_t from, int64_t n, const dou
 
 /* Replaces a group's equations by the rows of their factor, as far as field values go; where a block says nothing its
    row is 0. */
-static void factorise_group(int64_t n, double *k)
+INLINE void factorise_group(int64_t n, double *k)
 {
     int64_t w = n + 2;
     for (int64_t i = 0; i < n; i++) {
@@ -97,7 +97,7 @@ static HOT void stack_group(const ChannelFit *f, int64_t from, int64_t n, const 
     reduce_group(f, from, n, own, k);
     factorise_group(n, k);
     for (int64_t c = 0; c < f->width; c += LANES) {
-        const double *fields = f->field_rows + from * f->width + c;
+        const double *fields = f->basis + from * f->width + c;
         for (int64_t i = 0; i < n; i++) {
             lanes sum = k[i * w + i] * load(fields + i * f->width);
             for (int64_t j = i + 1; j < n; j++)
@@ -135,7 +135,7 @@ static HOT void field_of_blocks(const ChannelFit *f)
     for (int64_t i = 0; i < f->m->blocks; i++) {
         lanes sum = splat(0.0);
         for (int64_t c = 0; c < f->width; c += LANES)
-            sum += load(f->field_rows + i * f->width + c) * load(f->solution + c);
+            sum += load(f->basis + i * f->width + c) * load(f->solution + c);
         field[i] = total(sum);
     }
 }
@@ -152,7 +152,7 @@ static void coefficients_of_blocks(const ChannelFit *f, const double *packed)
 }
 
 /* Coefficients of the frequencies, given L_0 and the blocks' field. */
-static void substitute_frequencies(const ChannelFit *f, double *packed)
+static HOT void substitute_frequencies(const ChannelFit *f, double *packed)
 {
     const double *field = plane(f, FIELD);
     for (int64_t g = 1; g <= f->frequencies; g++) {
