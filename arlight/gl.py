@@ -21,8 +21,8 @@ def create_context() -> moderngl.Context:
     # moderngl and glcontext raise bare Exception when the library or a driver is missing
     except Exception as error:
         raise RenderingUnavailableError(
-            f"headless OpenGL 3.3 through EGL is needed for rendering and was not found ({error}); "
-            f"on Debian: apt-get install {_PACKAGES}; estimation alone works without it (--no-render)"
+            f"headless OpenGL 3.3 through EGL is needed here and was not found ({error}); on Debian: apt-get install "
+            f"{_PACKAGES}; relighting works without it by `--renderer native`"
         ) from error
 
 

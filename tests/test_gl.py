@@ -42,7 +42,7 @@ def test_without_a_driver_the_message_says_what_to_install(monkeypatch):
 
     monkeypatch.setattr(moderngl, "create_standalone_context", fail)
     with pytest.raises(
-        RenderingUnavailableError, match=r"libEGL.so.1 not loaded.*apt-get install libegl1.*--no-render"
+        RenderingUnavailableError, match=r"libEGL.so.1 not loaded.*apt-get install libegl1.*--renderer native"
     ):
         create_context()
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import av
@@ -338,15 +339,20 @@ def test_a_damaged_clip_gives_what_it_holds_and_says_so(arlight, footage, long_c
     assert 5 <= len(read_log(tmp_path / "old.partial.jsonl").records) < 40
 
 
-def test_without_opengl_the_remedy_is_named_and_lighting_still_works(footage, tmp_path):
-    environment = os.environ | {"LIBGL_DRIVERS_PATH": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
+def test_without_opengl_frames_are_lit_all_the_same_and_who_asks_for_it_is_told_the_remedy(footage, tmp_path):
+    environment = os.environ | {
+        "LIBGL_DRIVERS_PATH": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent",
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }  # fmt: skip
+    (tmp_path / "work").mkdir()
     command = [sys.executable, "-m", "arlight", "run", str(footage / "orbit.mp4")]
-    drawn = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert drawn.returncode == 1
-    assert "libegl1 libgl1-mesa-dri" in drawn.stderr
-    assert "--no-render" in drawn.stderr
-    assert files(tmp_path) == {}
-    command.append("--no-render")
-    measured = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert measured.returncode == 0, measured.stderr
-    assert json.loads((tmp_path / "orbit.jsonl").read_text().splitlines()[1])["status"] == "tracked"
+    run = partial(subprocess.run, cwd=tmp_path / "work", env=environment, capture_output=True, text=True, check=False)
+    asked = run([*command, "--renderer", "moderngl"])
+    assert asked.returncode == 1
+    assert "libegl1 libgl1-mesa-dri" in asked.stderr
+    assert "--renderer native" in asked.stderr
+    assert files(tmp_path / "work") == {}
+    lit = run([*command, "--output", "relit.mp4", "--lighting", "log.jsonl"])
+    assert lit.returncode == 0, lit.stderr
+    assert json.loads((tmp_path / "work" / "log.jsonl").read_text().splitlines()[1])["status"] == "tracked"
+    assert len(frames_of(tmp_path / "work" / "relit.mp4")) == FRAMES
