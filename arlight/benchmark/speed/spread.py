@@ -32,6 +32,12 @@ def spread(values: ArrayLike) -> Spread:
     return Spread(float(median), float(low), float(high), len(measured))
 
 
+def block_means(values: Sequence[float], length: int) -> list[float]:
+    """Means of every `length` measurements one after the other; what is left at the end is dropped."""
+    count = len(values) // length
+    return [float(mean) for mean in np.reshape(values[: count * length], (count, length)).mean(axis=1)]
+
+
 def paired_ratio(measured: Sequence[float], yardstick: Sequence[float]) -> Spread:
     """Ratios of measurements made in turns, each with its own neighbour: what slows both cancels.
 

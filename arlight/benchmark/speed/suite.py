@@ -155,7 +155,7 @@ class Suite:
 
     def _front(self) -> Findings:
         clips = [self.clip(name) for name in (_FRONT_CLIPS[:1] if self.quick else _FRONT_CLIPS)]
-        return measure_front(front_settings(self.quick), clips, self._count(18, 24), self.relighters)
+        return measure_front(front_settings(self.quick), clips, self._count(24, 48), self.relighters)
 
     def _april_tags(self) -> Findings:
         clip = self.clip(APRIL_TAGS.name)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arlight.benchmark.speed.spread import paired_ratio, spread
+from arlight.benchmark.speed.spread import block_means, paired_ratio, spread
 
 
 def test_most_of_the_values_lie_between_low_and_high():
@@ -29,6 +29,12 @@ def test_what_slows_both_of_a_pair_leaves_their_ratio():
     machine = np.random.default_rng(2).uniform(1.0, 10.0, 50)
     ratio = paired_ratio(list(0.25 * machine), list(machine))
     assert (ratio.low, ratio.median, ratio.high) == pytest.approx((0.25, 0.25, 0.25))
+
+
+def test_blocks_have_the_mean_of_what_comes_in_turns():
+    # one costly frame in four, and two that are left over
+    assert block_means([4.0, 0.0, 0.0, 0.0] * 3 + [4.0, 0.0], 4) == [1.0, 1.0, 1.0]
+    assert block_means([1.0, 2.0], 4) == []
 
 
 def test_an_interruption_of_a_few_pairs_does_not_move_the_median():
