@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.effort import Effort
+
 _REMEMBERED = 90
 """Frames whose times count."""
 _IN_TIME = 0.98
@@ -22,20 +24,6 @@ _FIRST_LOOK, _LOOK_EVERY = 5, 30
 """Frames after the start, and after a change, before a better rung is tried."""
 _LONGEST_DOUBT = 16
 """How many times as long a rung is left alone, at most, that was tried in vain."""
-
-
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """How much work a frame may cost: what can change from one frame to the next."""
-
-    order: int
-    """Highest order of the light that is measured and drawn."""
-    samples_per_block: int
-    """Pixels a block is sampled with at most."""
-    estimate_every: int = 1
-    """The light is measured in every n-th frame and predicted between."""
-    supersampling: int = 2
-    """Samples along a pixel's side when drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +50,7 @@ class BudgetController:
         if not budget_s > 0.0 or not ladder:
             raise ValueError(f"a budget needs a positive time and at least one rung, found {budget_s} s, {len(ladder)}")
         self.budget_s = budget_s
-        self._ladder = tuple(ladder)
+        self.ladder = tuple(ladder)
         self._costs = np.array([[rung.estimate_cost, rung.draw_cost] for rung in ladder])
         self._speeds: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
         # from the cheapest upward: the first frames shall not be late
@@ -80,7 +68,7 @@ class BudgetController:
     @property
     def effort(self) -> Effort:
         """What the next frame may cost."""
-        return self._ladder[self._place].effort
+        return self.ladder[self._place].effort
 
     def leaves_out(self) -> bool:
         """Whether the next frame is to be left out; ask once a frame."""
@@ -90,13 +78,14 @@ class BudgetController:
         self.left_out += 1
         return True
 
-    def took(self, estimate_s: float, draw_s: float) -> None:
-        """Learn what a frame took, at the present effort [s]."""
+    def took(self, effort: Effort, estimate_s: float, draw_s: float) -> None:
+        """Learn what a frame took [s] at an effort, which need not be the present one: stages overlap."""
         total = estimate_s + draw_s
-        self.frames_at[self._place] += 1
+        place = next(i for i, rung in enumerate(self.ladder) if rung.effort == effort)
+        self.frames_at[place] += 1
         self.late += total > self.budget_s
-        self._speeds.append(np.array([estimate_s, draw_s]) / np.maximum(self._costs[self._place], 1e-9))
-        cheapest = self._place == len(self._ladder) - 1
+        self._speeds.append(np.array([estimate_s, draw_s]) / self._costs[place])
+        cheapest = self._place == len(self.ladder) - 1
         self._owed = max(self._owed + total - self.budget_s, 0.0) if cheapest else 0.0
         self._wait -= 1
         expected = self._expected()

@@ -11,6 +11,7 @@ from threadpoolctl import ThreadpoolController
 
 from arlight.calibration.camera.exposure import ExposureMeter
 from arlight.camera import Camera
+from arlight.effort import Effort
 from arlight.errors import ProbeError
 from arlight.estimation.estimator import ITERATIONS, Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
@@ -72,6 +73,8 @@ class FrameEstimate:
     """Filtered lighting; None before the first estimate."""
     raw: Lighting | None
     """This frame's own estimate; None when the sheet was not seen."""
+    effort: Effort = field(default_factory=Effort)
+    """Limits that the work on it was held to."""
     timings_s: dict[str, float] = field(default_factory=dict)
     """Time of each stage by the tracker's clock, wall time by default [s]."""
     unexplained: float = float("nan")
@@ -113,7 +116,9 @@ class LightingTracker:
         clock: Callable[[], float] = perf_counter,
     ) -> None:
         self.settings = settings or TrackerSettings()
-        """Of the frames to come; order, samples and how often to estimate may change from frame to frame."""
+        """As they were given."""
+        self.effort = Effort()
+        """Limits to the work on the frames to come; may change from frame to frame."""
         self._clock = clock
         if self.settings.order != "auto":
             orders_up_to(probe.frequencies, self.settings.order)
@@ -130,11 +135,11 @@ class LightingTracker:
         # products this small run slower on several threads than on one
         self._blas = ThreadpoolController().select(user_api="blas")
         self.require(Need.of_coefficients(probe.frequencies))
+        self.reset()
 
     def require(self, need: Need) -> None:
         """Say what the light is wanted for, which the order `auto` goes by; all coefficients by default."""
         self._choice = OrderChoice(self._frequencies, need)
-        self.reset()
 
     def reset(self) -> None:
         """Forget everything about earlier frames."""
@@ -174,14 +179,16 @@ class LightingTracker:
         if pose.camera_from_probe is None and lighting is not None:
             pose = ProbePose(None, float("nan"), "coasting")
         unexplained = float("nan") if estimate is None else estimate.unexplained
-        return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, timings, unexplained)
+        return FrameEstimate(frame.index, frame.time_s, pose, lighting, raw, self.effort, timings, unexplained)
 
     def _is_due(self, pose: ProbePose) -> bool:
         """Whether the light is measured in this frame."""
         if pose.camera_from_probe is None:
             return False
         self._since_estimate += 1
-        if self._last is not None and self._since_estimate < self.settings.estimate_every:
+        if self._last is not None and self._since_estimate < (
+            self.effort.estimate_every or self.settings.estimate_every
+        ):
             return False
         self._since_estimate = 0
         return True
@@ -190,7 +197,7 @@ class LightingTracker:
         """The frame's own estimate, and when its blocks had been measured."""
         assert pose.camera_from_probe is not None
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
-        order = self.settings.order if self.settings.order != "auto" else self._choice.order_to_measure(frame.time_s)
+        order = self._order_to_measure(frame.time_s)
         blocks = self._block_order <= order
         last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
@@ -202,6 +209,10 @@ class LightingTracker:
         assert last is not None
         self._last = last
         return last, measured
+
+    def _order_to_measure(self, time_s: float) -> int:
+        order = self.settings.order if self.settings.order != "auto" else self._choice.order_to_measure(time_s)
+        return order if self.effort.order is None else min(order, self.effort.order)
 
     def _filtered(self, raw: Lighting | None, frame: Frame, pose: ProbePose) -> Lighting | None:
         """The light over time, relative to the frame's white paper: a change of exposure is no change of light."""

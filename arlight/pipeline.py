@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
+from arlight.budget import BudgetController
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.order_choice import Need
 from arlight.lighting_tracker import BlockEstimator, FrameEstimate, LightingTracker, TrackerSettings
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
@@ -16,7 +18,13 @@ from arlight.video.frame import Frame
 class FrameRelighter(Protocol):
     """What draws a lit object into a frame, such as `arlight.Relighter`."""
 
-    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
+    @property
+    def need(self) -> Need | None:
+        """What of the light the object shows; None while that is not known yet."""
+
+    def render(
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+    ) -> Frame:
         """The frame with the lit object in it; the frame itself where pose or light is not known."""
 
     def release(self) -> None:
@@ -56,6 +64,7 @@ class Pipeline:
         settings: TrackerSettings | None = None,
         assembly: Assembly | None = None,
         estimator: BlockEstimator | None = None,
+        budget: BudgetController | None = None,
     ) -> None:
         """Prepare the loop.
 
@@ -66,12 +75,15 @@ class Pipeline:
             settings: choices of the estimation.
             assembly: what calibration found the printed sheet to be.
             estimator: what makes lighting of the blocks; the model of the assembled sheet by default.
+            budget: holds a deadline; without it every frame gets all that the settings ask for.
 
         Raises:
             ProbeError: the sheet cannot be tracked.
         """
         self._tracker = LightingTracker(probe, camera, settings, assembly, estimator)
         self._relighter = relighter
+        self._budget = budget
+        self._need_is_known = relighter is None
 
     def process(self, frame: Frame) -> FrameResult:
         """Track the sheet, estimate its light, draw the object under that light.
@@ -83,6 +95,11 @@ class Pipeline:
 
     def estimate(self, frame: Frame) -> FrameEstimate:
         """The first half of `process`: track the sheet and estimate its light; frames are to come in order."""
+        if not self._need_is_known and self._relighter is not None and self._relighter.need is not None:
+            self._tracker.require(self._relighter.need)
+            self._need_is_known = True
+        if self._budget is not None:
+            self._tracker.effort = self._budget.effort
         return self._tracker.update(frame)
 
     def relight(self, frame: Frame, estimate: FrameEstimate) -> FrameResult:
@@ -90,8 +107,13 @@ class Pipeline:
         started = perf_counter()
         composite = frame
         if self._relighter is not None:
-            composite = self._relighter.render(frame, estimate.pose.camera_from_probe, estimate.lighting)
-        return FrameResult(composite, estimate, estimate.timings_s | {"render": perf_counter() - started})
+            composite = self._relighter.render(
+                frame, estimate.pose.camera_from_probe, estimate.lighting, estimate.effort.supersampling
+            )
+        render_s = perf_counter() - started
+        if self._budget is not None:
+            self._budget.took(estimate.effort, sum(estimate.timings_s.values()), render_s)
+        return FrameResult(composite, estimate, estimate.timings_s | {"render": render_s})
 
     def release(self) -> None:
         """Give back what belongs to the thread that relights, from that thread; it is acquired again when needed."""

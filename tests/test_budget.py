@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from arlight.budget import BudgetController, Effort, Rung
+from arlight.budget import BudgetController, Rung
+from arlight.effort import Effort
 
 LADDER = [
     Rung(Effort(order, 1200), estimate_cost, draw_cost)
@@ -20,7 +21,7 @@ def played(budget_s: float, frame_s: float, frames: int = 600, seed: int = 0, no
             continue
         rung = next(rung for rung in LADDER if rung.effort == controller.effort)
         slowness = frame_s * (1.0 + noise * chance.exponential())
-        controller.took(slowness * rung.estimate_cost / 3.0, slowness * rung.draw_cost * 2.0 / 3.0)
+        controller.took(rung.effort, slowness * rung.estimate_cost / 3.0, slowness * rung.draw_cost * 2.0 / 3.0)
     return controller
 
 
@@ -56,7 +57,7 @@ def test_a_machine_that_slows_down_is_followed_and_forgiven() -> None:
     for frame in range(900):
         rung = next(rung for rung in LADDER if rung.effort == controller.effort)
         frame_s = 0.030 if 300 <= frame < 500 else 0.010
-        controller.took(frame_s * rung.estimate_cost / 3.0, frame_s * rung.draw_cost * 2.0 / 3.0)
+        controller.took(rung.effort, frame_s * rung.estimate_cost / 3.0, frame_s * rung.draw_cost * 2.0 / 3.0)
         places.append(LADDER.index(rung))
     assert places[299] == 0
     assert places[310] > 0
@@ -76,7 +77,7 @@ def test_a_rung_that_is_tried_in_vain_is_tried_ever_less_often() -> None:
         last = place
         slow = 2.0 if place == 0 else 1.0
         rung = LADDER[place]
-        controller.took(0.012 * slow * rung.estimate_cost / 3.0, 0.012 * slow * rung.draw_cost * 2.0 / 3.0)
+        controller.took(rung.effort, 0.012 * slow * rung.estimate_cost / 3.0, 0.012 * slow * rung.draw_cost * 2.0 / 3.0)
     gaps = np.diff(tries)
     assert len(tries) >= 2
     assert gaps[-1] > 2 * gaps[0]

@@ -8,7 +8,10 @@ import pytest
 
 from arlight.camera import Camera
 from arlight.color import encoded_from_linear
+from arlight.effort import Effort
 from arlight.errors import CameraError, ProbeError, RenderingUnavailableError
+from arlight.estimation.order_choice import Need
+from arlight.fourier import frequency_order
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.layout import design_probe
 from arlight.radiometry import Radiometry
@@ -248,14 +251,47 @@ def test_a_sheet_half_out_of_the_picture_is_measured_where_it_is_seen(film):
     assert np.sqrt(np.mean(deviation**2)) < 2.0
 
 
-def test_a_lower_order_is_the_whole_estimate_cut_not_another_fit(film):
+def error(lighting, truth):
+    """Rms error of the coefficients that the lighting has, over the light's level."""
+    missed = lighting.coefficients - truth.coefficients[: len(lighting.frequencies)]
+    return np.sqrt(np.mean(np.abs(missed) ** 2)) / np.abs(truth.coefficients[0]).mean()
+
+
+def test_a_lower_order_is_told_as_well_without_a_look_at_the_rest(film):
     whole, low = LightingTracker(PROBE, CAMERA), LightingTracker(PROBE, CAMERA, TrackerSettings(order=1))
-    for synthetic in film()[:3]:
+    for synthetic in film():
         full, cut = whole.update(synthetic.frame), low.update(synthetic.frame)
-        count = len(cut.lighting.frequencies)
         assert (full.lighting.order, cut.lighting.order, cut.raw.order) == (2, 1, 1)
-        np.testing.assert_allclose(cut.raw.coefficients, full.raw.coefficients[:count], rtol=1e-9)
-        np.testing.assert_allclose(cut.raw.stddev, full.raw.stddev[:count], rtol=1e-9)
+    assert error(cut.lighting, synthetic.truth) < 1.3 * error(full.lighting.truncated(1), synthetic.truth) + 0.002
+
+
+def test_the_order_follows_what_is_shown_and_what_an_effort_allows(film):
+    count = 2 * len(PROBE.frequencies) - 1
+    order = np.repeat(frequency_order(PROBE.frequencies), 2)[1:]
+    tracker = LightingTracker(PROBE, CAMERA)
+    tracker.require(Need(np.eye(count), np.where(order < 2, 1.0, 1e-9), 0.04))
+    frames = [synthetic.frame for synthetic in film()] * 6
+    orders = []
+    for index, frame in enumerate(frames):
+        orders.append(tracker.update(replace(frame, index=index, time_s=0.04 * index)).lighting.order)
+    assert orders[0] == 2
+    assert orders[-1] == 1
+    tracker.effort = Effort(order=0)
+    estimate = tracker.update(replace(frames[0], time_s=0.04 * len(frames)))
+    assert estimate.lighting.order == 0
+    assert estimate.effort == Effort(order=0)
+
+
+def test_light_is_predicted_between_the_frames_that_are_measured(film):
+    every, third = LightingTracker(PROBE, CAMERA), LightingTracker(PROBE, CAMERA, TrackerSettings(estimate_every=3))
+    measured = []
+    for synthetic in film():
+        full, sparse = every.update(synthetic.frame), third.update(synthetic.frame)
+        measured.append(sparse.raw is not None)
+        assert sparse.pose.status == "tracked"
+        assert sparse.lighting is not None
+    assert measured[:6] == [True, False, False, True, False, False][: len(measured)]
+    assert error(sparse.lighting, synthetic.truth) < 2.0 * error(full.lighting, synthetic.truth) + 0.005
 
 
 @pytest.mark.parametrize("order", [-1, 3])

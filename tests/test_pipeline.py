@@ -1,11 +1,15 @@
 """The loop's order: what is estimated is what is drawn."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import arlight
+from arlight.budget import BudgetController, Rung
+from arlight.effort import Effort
+from arlight.estimation.order_choice import Need
 from arlight.pipeline import Pipeline
 from arlight.probe.layout import design_probe
 from arlight.synthetic.settings import SynthesisSettings, default_camera
@@ -18,11 +22,14 @@ CAMERA = default_camera((320, 240))
 class MarkingRelighter:
     """Marks what it is given: a pixel of the composite for the pose, one for the light."""
 
-    def __init__(self):
+    def __init__(self, need=None):
         self.calls = []
+        self.samples = []
+        self.need = need
 
-    def render(self, frame, camera_from_probe, lighting):
+    def render(self, frame, camera_from_probe, lighting, supersampling=None):
         self.calls.append((frame, camera_from_probe, lighting))
+        self.samples.append(supersampling)
         if camera_from_probe is None or lighting is None:
             return frame
         image = np.zeros((240, 320, 3), np.uint8)
@@ -91,3 +98,27 @@ def test_every_public_name_is_there():
         assert getattr(arlight, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
         arlight.Nothing  # noqa: B018
+
+
+def test_the_effort_that_a_budget_allows_reaches_both_halves(probe, frames):
+    effort = Effort(order=0, supersampling=1)
+    budget = BudgetController(10.0, [Rung(effort, 1.0, 1.0)])
+    relighter = MarkingRelighter()
+    pipeline = Pipeline(probe, CAMERA, relighter, budget=budget)
+    results = [pipeline.process(frame) for frame in frames]
+    assert [result.lighting.order for result in results] == [0] * len(frames)
+    assert relighter.samples == [1] * len(frames)
+    assert budget.frames_at.sum() == len(frames)
+    assert budget.late == 0
+
+
+def test_what_the_object_shows_decides_the_order(probe, frames):
+    count = 2 * len(probe.frequencies) - 1
+    need = Need(np.eye(count), np.where(np.arange(count) == 0, 1.0, 1e-12), 0.04)
+    pipeline = Pipeline(probe, CAMERA, MarkingRelighter(need))
+    orders = [
+        pipeline.process(replace(frame, index=index, time_s=0.04 * index)).lighting.order
+        for index, frame in enumerate(frames * 6)
+    ]
+    assert orders[0] == 1
+    assert orders[-1] == 0

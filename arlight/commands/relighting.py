@@ -6,6 +6,7 @@ from pathlib import Path
 from arlight.camera import Camera, Pose
 from arlight.commands.options.relighting import RelightingOptions
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.order_choice import Need
 from arlight.pipeline import FrameRelighter
 from arlight.probe.design import Probe
 from arlight.rendering.default_object import default_object
@@ -45,10 +46,18 @@ class _PreparedRelighter:
         self._made = thread.submit(
             Relighter, mesh, probe, camera, settings, order=order, cache_folder=user_cache_folder()
         )
+        # once the frames are under way, for it is not needed at once
+        self._need = thread.submit(lambda: self._made.result().need)
         thread.shutdown(wait=False)
 
-    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
-        return self._made.result().render(frame, camera_from_probe, lighting)
+    @property
+    def need(self) -> Need | None:
+        return self._need.result() if self._need.done() and self._need.exception() is None else None
+
+    def render(
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+    ) -> Frame:
+        return self._made.result().render(frame, camera_from_probe, lighting, supersampling)
 
     def release(self) -> None:
         if self._made.exception() is None:

@@ -43,7 +43,7 @@ class ObjectRenderer:
         """
         self._transfer, self._gloss_rows = transfer, gloss_rows
         self._thread = threading.get_ident()
-        self._samples = supersampling
+        self.supersampling = supersampling
         self._closed = mesh.closed
         self._context = create_context()
         # the viewport's rows run downward, which turns every triangle's winding round
@@ -76,7 +76,7 @@ class ObjectRenderer:
         if threading.get_ident() != self._thread:
             raise RuntimeError("an OpenGL context belongs to its thread: draw from the thread that made the renderer")
         size = view.region.size
-        width, height = size[0] * self._samples, size[1] * self._samples
+        width, height = size[0] * self.supersampling, size[1] * self.supersampling
         # others may have made their own context current in this thread
         with self._context:
             self._clip.write(view.projected.clip_coordinates(view.region))

@@ -48,6 +48,8 @@ class PyrenderDrawer:
         Raises:
             RenderingUnavailableError: pyrender or its OpenGL platform cannot be loaded.
         """
+        self.supersampling = 1
+        """Without effect: pyrender samples a pixel in its own way."""
         self._thread = threading.get_ident()
         self._reconstruction, self._camera = reconstruction, camera
         self._pyrender = _load_pyrender()

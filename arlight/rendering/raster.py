@@ -92,7 +92,9 @@ class RasterRenderer:
         lit = {"body": np.empty((3, n), np.float32), "mirrored": np.empty((3, n), np.float32)}
         own = {"ends": np.ascontiguousarray(ends), "matte": np.empty((3, n), np.float32)}
         self._shading.hold(lit | own | {"scratch": np.empty((4, n), np.float32)})
-        self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed, samples=supersampling)
+        self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed)
+        self.supersampling = supersampling
+        """Samples along a pixel's side; may change from picture to picture."""
         corners = np.zeros((n, _CORNER), np.float32)
         self._raster.hold(lit | {"faces": np.ascontiguousarray(mesh.faces, np.int32), "corners": corners})
         if mesh.textures is not None and mesh.uv is not None and mesh.layer is not None:
@@ -111,7 +113,8 @@ class RasterRenderer:
             (h, w, 4) linear radiance times coverage, and coverage, of the view's region; holds until the next call.
         """
         self._shade(view, packed)
-        raster, region, samples = self._raster, view.region, self._raster.samples
+        raster, region, samples = self._raster, view.region, self.supersampling
+        raster.samples = samples
         width, height = region.size
         raster.pixels = address(view.projected.pixels, np.float32)
         raster.depth_mm = address(view.projected.depth_mm, np.float32)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.order_choice import Need
 from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
 from arlight.rendering.appearance import Appearance, appearance
@@ -29,9 +30,15 @@ from arlight.video.frame import Frame, Region
 _DARKENING = 0.008
 """A shadow that takes less than this share of the light is below one 8-bit level, and pixels of less are left alone."""
 
+_TOLERANCE = 0.04
+"""Share by which a lower order of the light may raise the error of the picture."""
+
 
 class ObjectDrawer(Protocol):
     """What draws the object; one that uses OpenGL belongs to the thread that made it."""
+
+    supersampling: int
+    """Samples along a pixel's side."""
 
     def draw(self, view: View, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         """Linear premultiplied radiance and coverage (h, w, 4) of the view's region, by packed coefficients (m, 3).
@@ -108,7 +115,9 @@ class Relighter:
         self._vertices = np.ascontiguousarray(drawn.vertices_mm, np.float32)
         self._opened: ObjectDrawer | None = None
 
-    def render(self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None) -> Frame:
+    def render(
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+    ) -> Frame:
         """The frame with the lit object in it.
 
         Args:
@@ -116,6 +125,7 @@ class Relighter:
             camera_from_probe: the pose; None where the sheet is lost.
             lighting: the light; None before the first estimate. Of the relighter's frequencies it may have the first
                 alone, which costs less.
+            supersampling: samples along a pixel's side; as set by default.
 
         Returns:
             A new frame; the one given where pose or light is missing: nothing is drawn that is not lit by measurement.
@@ -138,7 +148,8 @@ class Relighter:
         linear = frame.linear_rgb(region)
         self._plane_shader.shade(linear, region, camera_from_probe, ratio)
         if view is not None:
-            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, self._draw(view, packed))
+            drawn = self._draw(view, packed, supersampling)
+            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, drawn)
         return frame.with_linear_rgb(region, linear)
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
@@ -153,6 +164,13 @@ class Relighter:
         rows = gloss_rows(self._reconstruction, s.roughness)
         return appearance(self.mesh, self.transfer, rows, s.roughness, s.normal_reflectance, self._frequencies)
 
+    @cached_property
+    def need(self) -> Need:
+        """What of the light the object shows, from which the order that it requires follows."""
+        independent = self._reconstruction.independent
+        shown = np.einsum("ij,ik,kj->j", independent, self.appearance.gram, independent, optimize=True)
+        return Need(independent, np.maximum(shown, 0.0), _TOLERANCE)
+
     def release(self) -> None:
         """Give back what drawing holds, from the thread that renders; it is made again when needed."""
         if self._opened is not None:
@@ -164,9 +182,10 @@ class Relighter:
         region = projected.region()
         return None if region is None else View(camera_from_probe, projected, region)
 
-    def _draw(self, view: View, packed: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _draw(self, view: View, packed: NDArray[np.float32], supersampling: int | None = None) -> NDArray[np.float32]:
         if self._opened is None:
             self._opened = self._open()
+        self._opened.supersampling = supersampling or self.settings.supersampling
         if not isinstance(self._opened, RasterRenderer) and len(packed) < len(self._reconstruction.independent):
             packed = self._reconstruction.completed(packed).astype(np.float32)
         return self._opened.draw(view, packed)
