@@ -25,7 +25,7 @@ class RelightSettings:
     """Fresnel reflectance at normal incidence: 0.04 a varnish, 0 a matte object."""
     surroundings_albedo: float = 0.3
     """ASSUMED albedo of what surrounds the object: light from below is this over pi times the irradiance, in [0, 1]."""
-    directions: int = 768
+    directions: int = 512
     """Directions of the hemisphere along which the object's shadows are cast."""
     shadow_texels: int = 128
     """Side of the map of the shadow on the sheet."""
