@@ -6,11 +6,10 @@ enum { FEWEST = 40, FEWEST_SECTORS = 8 };
 
 typedef struct {
     PaperPoints *points; /* of the sheet, and those that are found in a picture */
-    double *x;           /* (points) within [-1, 1] */
-    double *y;
-    double *ink;         /* (points) reflectance, 1 on paper */
-    int32_t *wedge;      /* (points) whether it lies on the wedge */
-    int32_t *sector;     /* (points) */
+    float *ink;          /* (points) reflectance: 1 on paper, 0 on a step without one */
+    uint8_t *wedge;      /* (points) whether it lies on the wedge */
+    uint8_t *sector;     /* (points) */
+    double *scale;       /* (2) of x and y to within [-1, 1] [1/mm] */
     double *mean;        /* (6) means of the surface's terms over all paper */
     double *vignetting;  /* (6) centre [px], 1 / (half a diagonal)^2 [px^-2], k1, k2, k3 */
     float *light;        /* (steps + 1) light of encoded values from 0 to 1 */
@@ -74,8 +73,8 @@ static Samples collect(const Meter *meter, int found)
         int at = meter->points->place[i];
         if (clipped(meter, i) || (meter->wedge[at] && !(crowded && meter->ink[at] > 0.0)))
             continue;
-        meter->used_x[count] = meter->x[at];
-        meter->used_y[count] = meter->y[at];
+        meter->used_x[count] = meter->scale[0] * meter->points->x[at];
+        meter->used_y[count] = meter->scale[1] * meter->points->y[at];
         meter->used_ink[count] = meter->ink[at];
         meter->used_light[count] = meter->values[i];
         meter->used_sector[count] = meter->sector[at];
@@ -102,15 +101,16 @@ static double quantisation(const Meter *meter, double level)
     return slope * meter->code * slope * meter->code / 12.0;
 }
 
-/* Measures the level of the white paper in a picture of width x height pixels under camera_from_probe.
+/* Measures the level of the white paper in a picture of width x height pixels under camera_from_probe
+   (rotation and translation).
 
    Gives the levels of the three channels in out[0..2], nan where they cannot be told, their variances in out[3..5], the
    number of samples that had a say in out[6..8], and how many points of the sheet were looked at in out[9]. */
 EXPORT void measure(const Meter *meter, const struct layout *layout, const struct picture *picture, int width,
-                    int height, const double *rotation, const double *translation, double *out)
+                    int height, const double *pose, double *out)
 {
     int32_t looked;
-    int found = locate(meter->points, width, height, rotation, translation, &looked);
+    int found = locate(meter->points, width, height, pose, &looked);
     read_pixels(layout, picture, found, meter->points->pixel, meter->encoded);
     find_gains(meter, found);
     for (int c = 0; c < 3; c++) {

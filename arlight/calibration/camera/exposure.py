@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 _LIBRARY = library(__file__, "exposure")
 _LIBRARY.measure.argtypes = [
-    ctypes.c_void_p, POINTERS[Layout], POINTERS[PictureCodes], *([ctypes.c_int] * 2), *([ctypes.c_void_p] * 3),
+    ctypes.c_void_p, POINTERS[Layout], POINTERS[PictureCodes], *([ctypes.c_int] * 2), *([ctypes.c_void_p] * 2),
 ]  # fmt: skip
 _LIBRARY.measure.restype = None
 _SPACING_MM = 2.2
@@ -55,7 +55,7 @@ class _Shared(Workspace):
     """What exposure.c calls Meter."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("points", "x", "y", "ink", "wedge", "sector", "mean", "vignetting")),
+        *((name, ctypes.c_void_p) for name in ("points", "ink", "wedge", "sector", "scale", "mean", "vignetting")),
         *((name, ctypes.c_void_p) for name in ("light", "encoded", *_SCRATCH)),
         *((name, ctypes.c_void_p) for name in ("used_sector", "residual", "weight", "bits")),
         ("steps", ctypes.c_int64),
@@ -80,10 +80,12 @@ class ExposureMeter:
         self._sampler = PaperSampler(probe, camera, _SPACING_MM, _MOST_POINTS)
         self._paper_share = len(self._sampler.paper_mm) / len(self._sampler.points_mm)
         self._format: PixelFormat | None = None
+        self._size = (0, 0)
         self._shared = _shared(self._sampler, np.array(probe.sheet_mm) / 2.0, camera)
         self._at = ctypes.byref(self._shared)
-        self._results = np.zeros(10)
-        self._results_at = address(self._results, np.float64)
+        # rotation and translation of the pose; levels, variances, samples that had a say, points that were looked at
+        self._pose, self._results = np.zeros((4, 3)), np.zeros((4, 3))
+        self._pose_at, self._results_at = (address(array, np.float64) for array in (self._pose, self._results))
 
     def measure(self, frame: Frame, pose: Pose) -> PaperLevel:
         """Level of the white paper, with its variance.
@@ -98,40 +100,35 @@ class ExposureMeter:
             frame: the picture; its size is the camera's.
             pose: camera_from_probe.
         """
-        if frame.format is not self._format:
-            self._decode(frame.format)
-        rotation, translation = (np.ascontiguousarray(part, float) for part in (pose.rotation, pose.translation))
+        if frame.format is not self._format or frame.size != self._size:
+            self._decode(frame)
+        self._pose[:3], self._pose[3] = pose.rotation, pose.translation
         planes = readable_planes(frame)
-        _LIBRARY.measure(
-            self._at, layout_of(frame.size, frame.format), PictureCodes.of(planes), *frame.size,
-            address(rotation, np.float64), address(translation, np.float64), self._results_at,
-        )  # fmt: skip
-        level, variance, counted = self._results[:9].reshape(3, 3).copy()
-        share = min(counted.tolist()) / (float(self._results[9]) * self._paper_share)
-        return PaperLevel(level, variance, min(share, 1.0))
+        _LIBRARY.measure(self._at, self._layout, PictureCodes.of(planes), *self._size, self._pose_at, self._results_at)
+        smallest = min(self._results[2].tolist()) / (self._results[3, 0] * self._paper_share)
+        return PaperLevel(self._results[0].copy(), self._results[1].copy(), min(float(smallest), 1.0))
 
-    def _decode(self, format_: PixelFormat) -> None:
-        """Take over what the codes of a format stand for."""
-        curve = decoding(format_.transfer, self._camera.radiometry)
+    def _decode(self, frame: Frame) -> None:
+        """Take over what the codes of pictures like this stand for."""
+        curve = decoding(frame.format.transfer, self._camera.radiometry)
         self._shared.hold({"light": np.ascontiguousarray(curve.light, np.float32)})
         self._shared.steps, self._shared.clip = len(curve.light) - 1, curve.clip
-        self._shared.code = 1.0 / format_.luma_code_range[1]
-        self._format = format_
+        self._shared.code = 1.0 / frame.format.luma_code_range[1]
+        self._format, self._size = frame.format, frame.size
+        self._layout = layout_of(frame.size, frame.format)
 
 
 def _shared(sampler: PaperSampler, scale_mm: Array, camera: Camera) -> _Shared:
     """What the compiled part reads, but for the codes' meaning, and its scratch memory."""
-    x, y = (sampler.points_mm / scale_mm).T
     half_diagonal_px = 0.5 * np.hypot(*camera.image_size)
     vignetting = [*camera.camera_matrix[:2, 2], half_diagonal_px**-2, *(camera.vignetting or (0.0, 0.0, 0.0))]
     shared = _Shared(points=ctypes.addressof(sampler.shared))
     shared.hold(
         {
-            "x": np.ascontiguousarray(x),
-            "y": np.ascontiguousarray(y),
-            "ink": np.ascontiguousarray(sampler.reflectance, float),
-            "wedge": (sampler.patch >= 0).astype(np.int32),
-            "sector": sampler.sector.astype(np.int32),
+            "ink": sampler.reflectance.astype(np.float32),
+            "wedge": (sampler.patch >= 0).astype(np.uint8),
+            "sector": sampler.sector.astype(np.uint8),
+            "scale": 1.0 / scale_mm,
             # the level is the mean over all of the paper, so that it does not depend on which of it is seen
             "mean": _surface(sampler.paper_mm / scale_mm).mean(axis=0),
             "vignetting": np.array(vignetting),

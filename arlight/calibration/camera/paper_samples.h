@@ -24,13 +24,14 @@ typedef struct {
     float right[3], up[3], origin[3]; /* the sheet's axes and origin as the camera has them */
 } Axes;
 
-static Axes axes_of(const double *rotation, const double *translation)
+/* Of rotation and translation [mm] of camera_from_probe, one after the other. */
+static Axes axes_of(const double *pose)
 {
     Axes axes;
     for (int k = 0; k < 3; k++) {
-        axes.right[k] = (float)rotation[3 * k];
-        axes.up[k] = (float)rotation[3 * k + 1];
-        axes.origin[k] = (float)translation[k];
+        axes.right[k] = (float)pose[3 * k];
+        axes.up[k] = (float)pose[3 * k + 1];
+        axes.origin[k] = (float)pose[9 + k];
     }
     return axes;
 }
@@ -63,12 +64,11 @@ static HOT void project_chunk(const PaperPoints *points, const Lens *lens, const
 
 /* Finds points that a picture of width x height pixels shows clear of everything, under camera_from_probe; returns how
    many, and in `looked` how many points it has looked at. */
-EXPORT int locate(const PaperPoints *points, int width, int height, const double *rotation, const double *translation,
-                  int32_t *looked)
+EXPORT int locate(const PaperPoints *points, int width, int height, const double *pose, int32_t *looked)
 {
     float column[CHUNK], row[CHUNK], right = (float)width - 1.5f, bottom = (float)height - 1.5f;
     Lens lens = lens_of(points->lens);
-    Axes axes = axes_of(rotation, translation);
+    Axes axes = axes_of(pose);
     int found = 0, most = (int)points->most;
     *looked = 0;
     for (int first = 0; first < points->count && found < most; first += CHUNK) {

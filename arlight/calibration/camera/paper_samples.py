@@ -24,7 +24,7 @@ from arlight.video.layout import POINTERS, Layout, PictureCodes, layout_of
 Array = NDArray[np.float64]
 
 _LIBRARY = library(__file__, "exposure")
-_LIBRARY.locate.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, *([ctypes.c_void_p] * 3)]
+_LIBRARY.locate.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, *([ctypes.c_void_p] * 2)]
 _LIBRARY.read_pixels.argtypes = [POINTERS[Layout], POINTERS[PictureCodes], ctypes.c_int, *([ctypes.c_void_p] * 2)]
 _LIBRARY.read_pixels.restype = None
 
@@ -136,11 +136,10 @@ class PaperSampler:
             pose: camera_from_probe.
         """
         looked = ctypes.c_int32()
-        rotation, translation = (np.ascontiguousarray(part, float) for part in (pose.rotation, pose.translation))
+        transform = np.concatenate([pose.rotation, pose.translation[None]]).astype(float)
         found = _LIBRARY.locate(
-            ctypes.byref(self.shared), *frame.size, address(rotation, np.float64), address(translation, np.float64),
-            ctypes.byref(looked),
-        )  # fmt: skip
+            ctypes.byref(self.shared), *frame.size, address(transform, np.float64), ctypes.byref(looked)
+        )
         kept, pixels = self._place[:found], self._pixel[:found].copy()
         return PaperSamples(
             self.points_mm[kept], pixels, read_encoded(frame, pixels), self.reflectance[kept], self.patch[kept],
