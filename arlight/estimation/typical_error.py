@@ -83,8 +83,10 @@ class TypicalError:
         _LIBRARY.typical_start(self._at, address(covariance, np.float64))
 
     def adopt(self, other: "TypicalError") -> None:
-        """Go on with the first numbers of another; the rest is as the first frame had it."""
+        """Go on with the first numbers of another; the rest is as the first frame had it, uncorrelated to those."""
         count = min(self.diagonal.shape[1], other.diagonal.shape[1])
+        # correlations with errors of another size would be none
+        self.covariance[:, :count, count:] = self.covariance[:, count:, :count] = 0.0
         self.covariance[:, :count, :count] = other.covariance[:, :count, :count]
         self.diagonal[:, :count] = other.diagonal[:, :count]
         self.shared.weight = other.shared.weight

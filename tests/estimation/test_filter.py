@@ -407,6 +407,19 @@ def test_orders_that_are_measured_again_begin_with_the_frame_and_are_averaged():
     assert last < 0.5 * first
 
 
+def test_error_bars_stay_a_covariance_when_orders_come_back_with_larger_errors():
+    filter_, fine, coarse = LightingFilter(), Source(sigma=0.002), Source(sigma=0.02)
+    coarse.covariance = correlated(0.02, seed=5) * 0.1
+    # errors that all have in common
+    coarse.covariance += 0.02**2 * np.ones((SIZE, SIZE))
+    for frame in range(40):
+        measured = fine.measure(natural(3), frame * FRAME_S)
+        filter_.update(measured.truncated(1), frame * FRAME_S)
+    for frame in range(40, 50):
+        measured = replace(fine.measure(natural(3), frame * FRAME_S), covariance=coarse.covariance)
+        assert_is_covariance(filter_.update(measured, frame * FRAME_S))
+
+
 def test_an_estimate_whose_parts_do_not_fit_is_refused():
     filter_, source = LightingFilter(), Source()
     measured = source.measure(natural(3), 0.0)
