@@ -1,3 +1,0 @@
-#version 330
-// Only the depth is kept.
-void main() {}
