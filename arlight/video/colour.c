@@ -4,15 +4,13 @@
 /* Lines of scratch memory for reading colour, and floats that each is longer than the region is wide. */
 EXPORT const int32_t reading_lines = ROW_LINES, line_margin = LINE_MARGIN;
 
-/* Y'CbCr to R'G'B' through a curve, pixel by pixel. */
-static HOT void colour_line(float *const *ycc, const float *matrix, struct curve curve, int32_t count,
-                            float *restrict out)
+static HOT void interleave(const float *restrict red, const float *restrict green, const float *restrict blue,
+                           int32_t count, float *restrict out)
 {
-    const float *luma = ycc[0], *cb = ycc[1], *cr = ycc[2];
     for (int32_t i = 0; i < count; i++) {
-        out[3 * i] = through(curve, product(matrix, 0, luma[i], cb[i], cr[i]));
-        out[3 * i + 1] = through(curve, product(matrix, 1, luma[i], cb[i], cr[i]));
-        out[3 * i + 2] = through(curve, product(matrix, 2, luma[i], cb[i], cr[i]));
+        out[3 * i] = red[i];
+        out[3 * i + 1] = green[i];
+        out[3 * i + 2] = blue[i];
     }
 }
 
@@ -25,11 +23,12 @@ EXPORT void read_colour(const struct layout *layout, const struct picture *pictu
     rows_begin(&rows, layout, picture, *box, guided, scratch);
     for (int32_t y = box->y0; y < box->y1; y++, out += 3 * width) {
         rows_read(&rows, y);
-        colour_line(rows.ycc, layout->rgb_from_ycc, *curve, width, out);
+        rows_colour(&rows, *curve, 0, width);
+        interleave(rows.rgb[0], rows.rgb[1], rows.rgb[2], width, out);
     }
 }
 
-static HOT void look_up(struct curve curve, int32_t count, float *restrict values)
+static HOT void values_through(struct curve curve, int32_t count, float *restrict values)
 {
     for (int32_t i = 0; i < count; i++)
         values[i] = through(curve, values[i]);
@@ -42,7 +41,7 @@ EXPORT void read_luma(const struct layout *layout, const struct picture *picture
     int32_t width = box->x1 - box->x0;
     for (int32_t y = box->y0; y < box->y1; y++, out += width) {
         read_codes(row_of(picture, 0, y), layout->wide, box->x0, width, layout->black, 1.0f / layout->luma_span, out);
-        look_up(*curve, width, out);
+        values_through(*curve, width, out);
     }
 }
 

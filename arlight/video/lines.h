@@ -21,6 +21,33 @@ static HOT void read_codes(const uint8_t *row, int32_t wide, int32_t first, int3
     }
 }
 
+/* Where a colour's component, a row of a matrix times Y'CbCr, lies in a curve: whole steps, and the share of the next
+   one; clamped, and 0 for what is no number. */
+static HOT void locate_component(struct curve curve, const float *matrix_row, float *const *ycc, int32_t count,
+                                 int32_t *restrict step, float *restrict share)
+{
+    const float *luma = ycc[0], *cb = ycc[1], *cr = ycc[2];
+    float a = matrix_row[0] * curve.last, b = matrix_row[1] * curve.last, c = matrix_row[2] * curve.last;
+    for (int32_t i = 0; i < count; i++) {
+        float x = a * luma[i] + b * cb[i] + c * cr[i];
+        x = x > 0.0f ? x : 0.0f;
+        x = x < curve.last ? x : curve.last;
+        step[i] = (int32_t)x;
+        share[i] = x - (float)step[i];
+    }
+}
+
+/* Looks up places in a curve. Not compiled for more than the plainest processor: entries are loaded one by one anyhow,
+   and put together faster for short registers. */
+static void look_up(struct curve curve, const int32_t *restrict step, const float *restrict share, int32_t count,
+                    float *restrict out)
+{
+    for (int32_t i = 0; i < count; i++) {
+        float before = curve.values[step[i]];
+        out[i] = before + (curve.values[step[i] + 1] - before) * share[i];
+    }
+}
+
 /* The nearest code to a number; what is no number becomes 0. */
 INLINE int32_t nearest_code(float value, float zero, float span, float top)
 {

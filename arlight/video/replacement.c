@@ -76,32 +76,43 @@ static int32_t averaging_next(struct averaging *work, int32_t y)
     return work->next++;
 }
 
-/* Finds which pixels of a row change, and their new Y'CbCr. */
-static HOT void replace_line(const struct layout *layout, float *const *ycc, const float *restrict linear,
-                             int32_t count, float *restrict changed, float *restrict luma, float *restrict cb,
-                             float *restrict cr)
+/* Which pixels of a row get light that differs from what they had. */
+static HOT void compare(const float *restrict linear, const float *restrict red, const float *restrict green,
+                        const float *restrict blue, int32_t count, float *restrict changed)
 {
-    struct curve decode = layout->decode, encode = layout->encode;
-    const float *rgb = layout->rgb_from_ycc, *back = layout->ycc_from_rgb;
-    const float *y = ycc[0], *u = ycc[1], *v = ycc[2];
     for (int32_t i = 0; i < count; i++) {
-        float red = linear[3 * i], green = linear[3 * i + 1], blue = linear[3 * i + 2];
-        float r = fabsf(red - through(decode, product(rgb, 0, y[i], u[i], v[i])));
-        float g = fabsf(green - through(decode, product(rgb, 1, y[i], u[i], v[i])));
-        float b = fabsf(blue - through(decode, product(rgb, 2, y[i], u[i], v[i])));
-        float most = r > g ? r : g;
+        float r = fabsf(linear[3 * i] - red[i]), g = fabsf(linear[3 * i + 1] - green[i]);
+        float b = fabsf(linear[3 * i + 2] - blue[i]), most = r > g ? r : g;
         most = most > b ? most : b;
-        /* the root of negative light is no number, and taken for 0 */
-        red = through(encode, sqrtf(red));
-        green = through(encode, sqrtf(green));
-        blue = through(encode, sqrtf(blue));
-        float new_u = product(back, 1, red, green, blue), new_v = product(back, 2, red, green, blue);
         /* a pixel with what is no number stays as it is: its sum is none either */
-        float share = (float)((most > UNCHANGED) & (r + g + b >= 0.0f));
-        changed[i] = share;
-        luma[i] = product(back, 0, red, green, blue);
-        cb[i] = share > 0.0f ? new_u : u[i];
-        cr[i] = share > 0.0f ? new_v : v[i];
+        changed[i] = (float)((most > UNCHANGED) & (r + g + b >= 0.0f));
+    }
+}
+
+/* Where one channel of linear light lies in the curve over its square root; the root of what is negative is no number,
+   and taken for 0. */
+static HOT void locate_root(struct curve curve, const float *restrict linear, int32_t count, int32_t *restrict step,
+                            float *restrict share)
+{
+    for (int32_t i = 0; i < count; i++) {
+        float x = sqrtf(linear[3 * i]) * curve.last;
+        x = x > 0.0f ? x : 0.0f;
+        x = x < curve.last ? x : curve.last;
+        step[i] = (int32_t)x;
+        share[i] = x - (float)step[i];
+    }
+}
+
+/* R'G'B' as Y'CbCr, chroma only where it changed. */
+static HOT void recode(const float *matrix, float *const *rgb, const float *restrict changed, int32_t count,
+                       float *restrict luma, float *restrict cb, float *restrict cr)
+{
+    const float *red = rgb[0], *green = rgb[1], *blue = rgb[2];
+    for (int32_t i = 0; i < count; i++) {
+        float u = product(matrix, 1, red[i], green[i], blue[i]), v = product(matrix, 2, red[i], green[i], blue[i]);
+        luma[i] = product(matrix, 0, red[i], green[i], blue[i]);
+        cb[i] = changed[i] > 0.0f ? u : cb[i];
+        cr[i] = changed[i] > 0.0f ? v : cr[i];
     }
 }
 
@@ -150,6 +161,29 @@ static void write_chroma(struct averaging *work, const struct layout *layout, co
     }
 }
 
+/* Finds where a row gets new light, writes its luma there and keeps its chroma. */
+static void replace_row(struct rows *rows, const struct picture *to, int32_t y, struct box box, const float *linear,
+                        float *const *kept, float *luma)
+{
+    const struct layout *layout = rows->layout;
+    int32_t left = box.x0 - rows->box.x0, end = box.x1 - box.x0, first = 0;
+    float *changed = kept[CHANGED] + left;
+    rows_colour(rows, layout->decode, left, end);
+    compare(linear, rows->rgb[0], rows->rgb[1], rows->rgb[2], end, changed);
+    while (first < end && changed[first] == 0.0f)
+        first++;
+    while (end > first && changed[end - 1] == 0.0f)
+        end--;
+    for (int k = 0; k < 3; k++) {
+        locate_root(layout->encode, linear + 3 * first + k, end - first, rows->step, rows->share);
+        look_up(layout->encode, rows->step, rows->share, end - first, rows->rgb[k]);
+    }
+    recode(layout->ycc_from_rgb, rows->rgb, changed + first, end - first, luma, kept[NEW_CB] + left + first,
+           kept[NEW_CR] + left + first);
+    write_changed(row_of(to, 0, y), layout->wide, box.x0 + first, luma, changed + first, end - first, layout->black,
+                  layout->luma_span, layout->top);
+}
+
 /* Puts new linear light (h, w, 3) into a region of `to`, a copy of `from`, where it differs from what is there.
    `around` is the region with the pixels that share a chroma sample with it. */
 EXPORT void replace_colour(const struct layout *layout, const struct picture *from, const struct picture *to,
@@ -157,24 +191,20 @@ EXPORT void replace_colour(const struct layout *layout, const struct picture *fr
 {
     struct rows rows;
     struct averaging work;
-    int32_t width = around->x1 - around->x0, inside = box->x1 - box->x0, left = box->x0 - around->x0;
+    int32_t width = around->x1 - around->x0;
     rows_begin(&rows, layout, from, *around, 1, scratch);
     averaging_begin(&work, layout, *around, scratch + ROW_LINES * (width + LINE_MARGIN));
     for (int32_t y = around->y0; y < around->y1; y++) {
-        float **kept = work.kept[y % KEPT], *luma = work.sums[0];
+        float **kept = work.kept[y % KEPT];
         rows_read(&rows, y);
         memset(kept[CHANGED], 0, (size_t)width * sizeof(float));
         for (int k = 0; k < 2; k++) {
             memcpy(kept[OLD_CB + k], rows.ycc[k + 1], (size_t)width * sizeof(float));
             memcpy(kept[NEW_CB + k], rows.ycc[k + 1], (size_t)width * sizeof(float));
         }
-        if (y >= box->y0 && y < box->y1) {
-            float *part[3] = {rows.ycc[0] + left, rows.ycc[1] + left, rows.ycc[2] + left};
-            replace_line(layout, part, linear + (ptrdiff_t)(y - box->y0) * inside * 3, inside, kept[CHANGED] + left,
-                         luma, kept[NEW_CB] + left, kept[NEW_CR] + left);
-            write_changed(row_of(to, 0, y), layout->wide, box->x0, luma, kept[CHANGED] + left, inside, layout->black,
-                          layout->luma_span, layout->top);
-        }
+        if (y >= box->y0 && y < box->y1)
+            replace_row(&rows, to, y, *box, linear + (ptrdiff_t)(y - box->y0) * 3 * (box->x1 - box->x0), kept,
+                        work.sums[0]);
         write_chroma(&work, layout, to, y);
     }
 }

@@ -10,7 +10,7 @@
 #define MAX_GAIN 2.0f
 
 /* Lines of floats that `rows_begin` takes from its scratch memory, each as long as the region and a margin. */
-#define ROW_LINES 12
+#define ROW_LINES 17
 #define LINE_MARGIN 16
 
 /* Chroma at its own resolution, of the two chroma rows that the row in work lies between. */
@@ -26,6 +26,9 @@ struct rows {
     float *between;         /* (count) one of these between the two rows */
     float *pixels;          /* (length) */
     float *ycc[3];          /* (width of the region) the result */
+    float *rgb[3];          /* (width) the same as colour, from `rows_colour` */
+    float *share;           /* (width) places in a curve */
+    int32_t *step;
 };
 
 /* Begins at the region's top; `scratch` holds ROW_LINES lines of the region's width + LINE_MARGIN floats. */
@@ -46,9 +49,12 @@ static inline void rows_begin(struct rows *rows, const struct layout *layout, co
         rows->chroma[0][k] = scratch + line * k;
         rows->chroma[1][k] = scratch + line * (k + 3);
         rows->ycc[k] = scratch + line * (k + 6);
+        rows->rgb[k] = scratch + line * (k + 9);
     }
-    rows->between = scratch + line * 9;
-    rows->pixels = scratch + line * 10;
+    rows->between = scratch + line * 12;
+    rows->pixels = scratch + line * 13;
+    rows->share = scratch + line * 15;
+    rows->step = (int32_t *)(scratch + line * 16);
 }
 
 /* Luma averaged at the samples of a chroma row as chroma was. */
@@ -153,6 +159,16 @@ static inline void rows_read(struct rows *rows, int32_t y)
     }
     if (rows->guided)
         guide(rows->ycc[0], low, box.x1 - box.x0, rows->ycc[1], rows->ycc[2]);
+}
+
+/* Fills `rgb` with the row's colour through a curve, for `count` pixels from `first` of the region's on. */
+static inline void rows_colour(struct rows *rows, struct curve curve, int32_t first, int32_t count)
+{
+    float *ycc[3] = {rows->ycc[0] + first, rows->ycc[1] + first, rows->ycc[2] + first};
+    for (int k = 0; k < 3; k++) {
+        locate_component(curve, rows->layout->rgb_from_ycc + 3 * k, ycc, count, rows->step, rows->share);
+        look_up(curve, rows->step, rows->share, count, rows->rgb[k]);
+    }
 }
 
 #endif
