@@ -16,7 +16,7 @@ typedef struct {
     double texel_from_ray[9]; /* homogeneous (column, row) of the plane's point that a ray meets */
 } Plane;
 
-/* Homogeneous texels (u, v, w) at two neighbouring nodes of a row of pixels: the first, and the change to the second. */
+/* Homogeneous texels (u, v, w) at two neighbouring nodes of a row: the first, and the change to the second. */
 static inline void texels_of_cell(const Plane *p, int64_t column, int64_t y, float start[3], float change[3])
 {
     float below = (float)(y % CELL) / CELL;
@@ -78,7 +78,7 @@ EXPORT HOT void shade_plane(const Plane *p)
         }
 }
 
-/* Lay radiance times coverage, and coverage, (height, width, 4) over linear light whose rows are `stride` pixels long. */
+/* Lay radiance times coverage, and coverage, (height, width, 4) over linear light with rows of `stride` pixels. */
 EXPORT HOT void cover(float *linear, int64_t stride, const float *drawn, int64_t width, int64_t height)
 {
     for (int64_t row = 0; row < height; row++)

@@ -42,7 +42,8 @@ EXPORT HOT int64_t project_points(
         float divisor = fabsf(depth) < near ? near : depth;
         float x = (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + t[0]) / divisor;
         float y = (m[3] * p[0] + m[4] * p[1] + m[5] * p[2] + t[1]) / divisor;
-        float bent_x, bent_y, straight_x = lens.focal_x * x + lens.centre_x, straight_y = lens.focal_y * y + lens.centre_y;
+        float straight_x = lens.focal_x * x + lens.centre_x, straight_y = lens.focal_y * y + lens.centre_y;
+        float bent_x, bent_y;
         project(&lens, x, y, &bent_x, &bent_y);
         int seen = depth > near, bent = seen & (x * x + y * y < reach);
         float px = bent ? bent_x : straight_x, py = bent ? bent_y : straight_y;

@@ -31,7 +31,8 @@ static inline float two_to(float x)
     return part * scale;
 }
 
-/* Directional albedo of the gloss: fit of the split-sum integral by B. Karis, "Physically Based Shading on Mobile" (2014). */
+/* Directional albedo of the gloss: the split-sum integral as B. Karis, "Physically Based Shading on Mobile" (2014),
+   fits it. */
 static inline float gloss_albedo(float cosine, float roughness, float reflectance)
 {
     float rx = 1.0f - roughness, ry = 0.0425f - 0.0275f * roughness;
@@ -47,7 +48,8 @@ static inline void octahedral_place(float x, float y, float z, float side, float
 {
     float scale = 1.0f / (fabsf(x) + fabsf(y) + fabsf(z));
     x *= scale, y *= scale;
-    float folded_x = (x >= 0.0f ? 1.0f - fabsf(y) : fabsf(y) - 1.0f), folded_y = (y >= 0.0f ? 1.0f - fabsf(x) : fabsf(x) - 1.0f);
+    float folded_x = (x >= 0.0f ? 1.0f - fabsf(y) : fabsf(y) - 1.0f);
+    float folded_y = (y >= 0.0f ? 1.0f - fabsf(x) : fabsf(x) - 1.0f);
     *u = ((z >= 0.0f ? x : folded_x) + 1.0f) * 0.5f * side - 0.5f;
     *v = ((z >= 0.0f ? y : folded_y) + 1.0f) * 0.5f * side - 0.5f;
     *u = lesser(greater(*u, 0.0f), side - 1.001f);

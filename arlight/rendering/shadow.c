@@ -8,7 +8,7 @@ static inline float left_over(float hidden, float open)
     return open > 0.0f ? lesser(greater(1.0f - hidden / open, 0.0f), 1.0f) : 1.0f;
 }
 
-/* ratio (side * side, 4) of three colours, the fourth the least of them; from what is hidden, (3, stride), of `open`. */
+/* ratio (count, 4) of three colours, the fourth the least of them; from what is hidden, (3, stride), of `open`. */
 EXPORT HOT void irradiance_ratio(
     const float *hidden, int64_t stride, const float *open, int64_t count, float *ratio)
 {
@@ -21,7 +21,7 @@ EXPORT HOT void irradiance_ratio(
     }
 }
 
-/* First and last column and row, (4,), of the texels whose ratio is below a limit; none where the last is before the first. */
+/* First and last column and row, (4,), of the texels whose ratio is below a limit; if none is, last before first. */
 EXPORT void dark_box(const float *ratio, int64_t side, double limit, int64_t *box)
 {
     box[0] = box[2] = side, box[1] = box[3] = -1;

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct {
-    const uint8_t *levels; /* level by level (layers, height >> level, width >> level, 3), at least 1 pixel; row 0 is v = 0 */
+    const uint8_t *levels; /* each (layers, height >> level, width >> level, 3), at least 1 pixel; row 0 is v = 0 */
     const float *linear;   /* (256,) linear light of each code */
     int64_t layers, width, height, level_count;
 } Texture;

@@ -127,6 +127,7 @@ def test_what_reaches_behind_the_camera_is_left_out_and_the_rest_drawn(camera, p
     assert np.array_equal(drawn(matte_renderer(both, 1.0), both, camera, pose), expected)
 
 
+@pytest.mark.filterwarnings("ignore:invalid value encountered in matmul")
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e18])
 def test_impossible_poses_draw_nothing(camera, pose, bad):
     mesh = default_object(400).placed(40.0)
