@@ -6,6 +6,9 @@
 
 #include "picture.h"
 
+/* Floats that a line of scratch memory is longer than the region is wide: what chroma at its edges averages. */
+#define LINE_MARGIN 16
+
 /* A part of a row of codes as numbers: out = (code - zero) * scale. */
 static HOT void read_codes(const uint8_t *row, int32_t wide, int32_t first, int32_t count, float zero, float scale,
                            float *restrict out)

@@ -1,80 +1,12 @@
 /* Writes new light into a region of a picture, and pictures in another format; chroma is averaged as it was read. */
+#include "averaging.h"
 #include "rows.h"
 
 /* Linear light within this of what a pixel had is no change: a thirtieth of an 8-bit level in the dark. */
 #define UNCHANGED 1e-5f
-/* Rows kept for chroma that averages them: more than a chroma sample's reach. */
-#define KEPT 8
-
-/* Lines that averaging works on, of each kept row. */
-enum { CHANGED, OLD_CB, OLD_CR, NEW_CB, NEW_CR, KINDS };
-
-/* Chroma rows that are averaged as soon as the last of their pixels' rows is there. */
-struct averaging {
-    const struct axis *columns, *rows;
-    int32_t x0, y0, x1, y1;             /* pixels that are there; samples that average others are left alone */
-    int32_t first, count;               /* chroma columns */
-    int32_t next;                       /* chroma row */
-    float *kept[KEPT][KINDS];           /* (x1 - x0) pixels' rows, by their number's lowest bits */
-    float *sums[KINDS];                 /* (x1 - x0) weighted sums of rows */
-    float *means[KINDS];                /* (count) */
-};
-
-/* Lines that `averaging_begin` takes from its scratch memory. */
-#define AVERAGING_LINES ((KEPT + 2) * KINDS)
 
 /* Lines of scratch memory for writing colour. */
 EXPORT const int32_t writing_lines = ROW_LINES + AVERAGING_LINES;
-
-static void averaging_begin(struct averaging *work, const struct layout *layout, struct box there, float *scratch)
-{
-    const struct axis *columns = &layout->columns, *rows = &layout->rows;
-    int32_t line = there.x1 - there.x0 + LINE_MARGIN;
-    work->columns = columns, work->rows = rows;
-    work->x0 = there.x0, work->y0 = there.y0, work->x1 = there.x1, work->y1 = there.y1;
-    for (int i = 0; i < KEPT; i++)
-        for (int k = 0; k < KINDS; k++)
-            work->kept[i][k] = scratch + line * (i * KINDS + k);
-    for (int k = 0; k < KINDS; k++) {
-        work->sums[k] = scratch + line * (KEPT * KINDS + k);
-        work->means[k] = scratch + line * ((KEPT + 1) * KINDS + k);
-    }
-    work->first = columns->lower[there.x0];
-    work->next = rows->lower[there.y0];
-    int32_t end = columns->upper[there.x1 - 1] + 1;
-    while (work->first < end && columns->tapped[work->first] < there.x0)
-        work->first++;
-    while (end > work->first && columns->tapped[(columns->taps - 1) * columns->samples + end - 1] >= there.x1)
-        end--;
-    work->count = end - work->first;
-    while (work->next < rows->samples && rows->tapped[work->next] < there.y0)
-        work->next++;
-}
-
-/* Averages the kept rows of some kinds at the chroma samples of row r. */
-static void average_rows(struct averaging *work, int32_t r, int first_kind)
-{
-    const struct axis *rows = work->rows;
-    int32_t width = work->x1 - work->x0;
-    for (int k = first_kind; k < KINDS; k++) {
-        memset(work->sums[k], 0, (size_t)width * sizeof(float));
-        for (int32_t t = 0; t < rows->taps; t++) {
-            int32_t y = rows->tapped[t * rows->samples + r];
-            add_line(work->sums[k], work->kept[y % KEPT][k], rows->tap_weights[t], width);
-        }
-        average_columns(work->columns, work->sums[k], work->x0, work->first, work->first + work->count,
-                        work->means[k]);
-    }
-}
-
-/* The next chroma row whose pixels' rows are all there up to y, -1 for none. */
-static int32_t averaging_next(struct averaging *work, int32_t y)
-{
-    const struct axis *rows = work->rows;
-    if (work->next >= rows->samples || rows->tapped[(rows->taps - 1) * rows->samples + work->next] > y)
-        return -1;
-    return work->next++;
-}
 
 /* Which pixels of a row get light that differs from what they had. */
 static HOT void compare(const float *restrict linear, const float *restrict red, const float *restrict green,

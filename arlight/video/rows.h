@@ -9,9 +9,8 @@
 /* Chroma follows luma at most by this factor upward: grey stripes seldom reach it, coloured edges would pass it. */
 #define MAX_GAIN 2.0f
 
-/* Lines of floats that `rows_begin` takes from its scratch memory, each as long as the region and a margin. */
+/* Lines that `rows_begin` takes from its scratch memory. */
 #define ROW_LINES 17
-#define LINE_MARGIN 16
 
 /* Chroma at its own resolution, of the two chroma rows that the row in work lies between. */
 struct rows {
@@ -126,8 +125,10 @@ static inline void spread(const struct axis *columns, const float *line, int32_t
                          (to - from) / 2, out + (x - x0));
             x = to;
         }
-        if (x < x1)
-            out[x - x0] = line[lower[x] - first] + columns->weight[x] * (line[upper[x] - first] - line[lower[x] - first]);
+        if (x < x1) {
+            float before = line[lower[x] - first];
+            out[x - x0] = before + columns->weight[x] * (line[upper[x] - first] - before);
+        }
     }
 }
 
