@@ -1,6 +1,7 @@
 """The `arlight` command: one dataclass of options a subcommand, no logic."""
 
 import sys
+from argparse import ArgumentParser
 from importlib import import_module
 from inspect import cleandoc
 from typing import Annotated, Any, Union
@@ -11,6 +12,7 @@ from rich.console import Console
 from arlight.commands.dispatch import run_command
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.errors import ArlightError
+from arlight.presets import PRESETS
 
 COMMANDS = {
     "run": "RunOptions",
@@ -46,7 +48,10 @@ def main(arguments: list[str] | None = None) -> int:
 def _parsed(arguments: list[str]) -> Any:
     """The options of the subcommand that is named, which alone is loaded; all are for the list of them."""
     if arguments and arguments[0] in COMMANDS:
-        return tyro.cli(_options(arguments[0]), prog=f"arlight {arguments[0]}", args=arguments[1:])
+        options = _options(arguments[0])
+        return tyro.cli(
+            options, prog=f"arlight {arguments[0]}", args=arguments[1:], default=_defaults(options, arguments[1:])
+        )
     every: Any = Union[tuple(Annotated[_options(name), _listed(name)] for name in COMMANDS)]  # noqa: UP007
     return tyro.cli(
         every,
@@ -55,6 +60,17 @@ def _parsed(arguments: list[str]) -> Any:
         description="Light virtual objects in footage with the light that is really there, "
         "measured from a printed sheet.",
     )
+
+
+def _defaults(options: Any, arguments: list[str]) -> Any:
+    """Those of the preset that is asked for, where there are presets."""
+    if not hasattr(options, "of_preset"):
+        return None
+    named = ArgumentParser(add_help=False, exit_on_error=False, allow_abbrev=False)
+    named.add_argument("--preset", default="balanced", nargs="?")
+    name = named.parse_known_args(arguments)[0].preset
+    # what is no preset is refused with the others
+    return options.of_preset(name if name in PRESETS else "balanced")
 
 
 def _listed(name: str) -> Any:

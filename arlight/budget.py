@@ -16,12 +16,14 @@ from arlight.effort import Effort
 
 _REMEMBERED = 90
 """Frames whose times count."""
-_IN_TIME = 0.98
+_IN_TIME = 0.97
 """Share of them that a rung is to make in time."""
 _ROOM = 0.85
 """Share of the budget that a better rung may take before it is tried."""
 _FIRST_LOOK, _LOOK_EVERY = 5, 30
 """Frames after the start, and after a change, before a better rung is tried."""
+_MOST_OWED = 4.0
+"""Budgets that late frames may owe: frames are left out for slowness that lasts, not for a single hitch."""
 _LONGEST_DOUBT = 16
 """How many times as long a rung is left alone, at most, that was tried in vain."""
 
@@ -84,9 +86,13 @@ class BudgetController:
         place = next(i for i, rung in enumerate(self.ladder) if rung.effort == effort)
         self.frames_at[place] += 1
         self.late += total > self.budget_s
+        if self.frames_at.sum() == 1:
+            # acquires the sheet and waits for the object: tells nothing about the others
+            return
         self._speeds.append(np.array([estimate_s, draw_s]) / self._costs[place])
         cheapest = self._place == len(self.ladder) - 1
-        self._owed = max(self._owed + total - self.budget_s, 0.0) if cheapest else 0.0
+        owed = min(max(self._owed + total - self.budget_s, 0.0), _MOST_OWED * self.budget_s)
+        self._owed = owed if cheapest else 0.0
         self._wait -= 1
         expected = self._expected()
         if expected[self._place] > self.budget_s and not cheapest:
@@ -96,7 +102,7 @@ class BudgetController:
 
     def _expected(self) -> NDArray[np.float64]:
         """(rungs,) time that nearly all frames of late would have stayed within [s]."""
-        return np.quantile(np.array(self._speeds) @ self._costs.T, _IN_TIME, axis=0, method="higher")
+        return np.quantile(np.array(self._speeds) @ self._costs.T, _IN_TIME, axis=0)
 
     def _fall(self, expected: NDArray[np.float64]) -> None:
         self._doubt[self._place] = min(2 * self._doubt[self._place], _LONGEST_DOUBT)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from arlight.calibration.camera.exposure import ExposureMeter
 from arlight.camera import Camera
 from arlight.effort import Effort
 from arlight.errors import ProbeError
-from arlight.estimation.estimator import ITERATIONS, Estimate, LightingEstimator
+from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.nuisance import Nuisance
@@ -21,6 +21,7 @@ from arlight.estimation.order_choice import Need, OrderChoice
 from arlight.fourier import frequency_order, orders_up_to
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
+from arlight.tracker_settings import TrackerSettings
 from arlight.tracking.block_layout import field_blocks
 from arlight.tracking.block_means import BlockMeans
 from arlight.tracking.blocks import BlockMeter
@@ -34,29 +35,6 @@ _LEVEL_DEVIATION = 0.005
 """Relative deviation beyond which the white paper's level is worse than the light's own from frame to frame."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
-
-Order = int | Literal["auto"]
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerSettings:
-    """Choices that trade speed for accuracy."""
-
-    samples_per_block: int = 1200
-    """Pixels a block is sampled with at most."""
-    alignment_levels: int = 1
-    """Levels of resolution that the pose is aligned on, 1 to 4; coarser ones are always there to fall back on."""
-    iterations: int = ITERATIONS
-    """How often weights and solution are refined in a frame."""
-    estimate_every: int = 1
-    """The light is measured in every n-th frame that shows the sheet, and predicted in those between."""
-    order: Order = "auto"
-    """Highest order of the light that is measured, from 0 to the sheet's; `auto` goes by what the data support and the
-    object shows. Blocks of higher orders are not looked at."""
-    filtered: bool = True
-    """Average over time; without it every frame stands alone."""
-    bounces: bool = True
-    """Model the light reflected between paper and glass; off only for sheets without it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,11 +99,16 @@ class Pipeline:
             self._tracker.require(self._relighter.need)
             self._need_is_known = True
         if self._budget is not None:
+            if self._budget.leaves_out():
+                pose = ProbePose(None, float("nan"), "left out")
+                return FrameEstimate(frame.index, frame.time_s, pose, None, None)
             self._tracker.effort = self._budget.effort
         return self._tracker.update(frame)
 
     def relight(self, frame: Frame, estimate: FrameEstimate) -> FrameResult:
         """The second half: draw the object; from one thread, which need not be the one that estimates."""
+        if estimate.pose.status == "left out":
+            return FrameResult(frame, estimate, estimate.timings_s)
         started = perf_counter()
         composite = frame
         if self._relighter is not None:

@@ -3,17 +3,22 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from arlight.lighting_tracker import TrackerSettings
+from arlight.budget import Rung
+from arlight.effort import Effort
 from arlight.rendering.settings import RelightSettings
+from arlight.tracker_settings import TrackerSettings
 
 PresetName = Literal["fast", "balanced", "accurate"]
+
+
+EncoderPreset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"]
 
 
 @dataclass(frozen=True, slots=True)
 class EncodingSettings:
     """How the relit video is compressed (H.264)."""
 
-    preset: str = "ultrafast"
+    encoder_preset: EncoderPreset = "ultrafast"
     """Time spent on compression: slower presets of libx264 make smaller files."""
     crf: int = 18
     """Quality, 0 (lossless) to 51; lower is better and larger."""
@@ -44,3 +49,13 @@ PRESETS: dict[PresetName, Preset] = {
     ),
 }
 """What `--preset` chooses."""
+
+LADDER: tuple[Rung, ...] = (
+    Rung(Effort(), 1.0, 1.0),
+    Rung(Effort(supersampling=1), 1.0, 0.65),
+    Rung(Effort(samples_per_block=300, supersampling=1), 0.8, 0.65),
+    Rung(Effort(samples_per_block=300, estimate_every=2, supersampling=1), 0.55, 0.65),
+    Rung(Effort(order=3, samples_per_block=300, estimate_every=2, supersampling=1), 0.4, 0.6),
+    Rung(Effort(order=2, samples_per_block=300, estimate_every=4, supersampling=1), 0.3, 0.55),
+)
+"""What a deadline gives up, step by step, from the settings as they are, with what each step costs of the whole."""

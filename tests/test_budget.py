@@ -62,7 +62,8 @@ def test_a_machine_that_slows_down_is_followed_and_forgiven() -> None:
     assert places[299] == 0
     assert places[310] > 0
     assert places[-1] == 0
-    assert controller.late <= 2
+    # a few late frames are chance, more are a slower machine
+    assert controller.late <= 6
 
 
 def test_a_rung_that_is_tried_in_vain_is_tried_ever_less_often() -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from arlight.commands.deadline import account, make_controller
 from arlight.commands.interruption import INTERRUPTED_EXIT_CODE
 from arlight.commands.loop import Work, run_frames
 from arlight.commands.options.demo import DemoOptions
@@ -11,6 +12,7 @@ from arlight.commands.relighting import make_relighter
 from arlight.commands.summary import print_summary
 from arlight.errors import ArlightError
 from arlight.pipeline import Pipeline
+from arlight.presets import PRESETS
 from arlight.probe.design import Probe
 from arlight.probe.layout import design_probe
 from arlight.results.frame_loop import Sinks
@@ -41,8 +43,10 @@ def run(options: DemoOptions) -> int:
     # refused before the object is prepared, which takes seconds
     load_environment(options.environment)
     probe = design_probe(options.order)
+    budget = make_controller(options.budget)
     relighter = make_relighter(options.relighting, probe, settings.filming_camera)
-    pipeline = Pipeline(probe, settings.filming_camera, relighter)
+    tracker = PRESETS[options.preset].tracker
+    pipeline = Pipeline(probe, settings.filming_camera, relighter, tracker, budget=budget)
     statistics = RunStatistics()
     try:
         interrupted = _process(options, settings, probe, pipeline, outputs, statistics)
@@ -50,7 +54,7 @@ def run(options: DemoOptions) -> int:
         abandon(outputs.values(), worth_keeping=statistics.tracked > 0)
         raise
     written = {option.removeprefix("--"): output.keep() for option, output in outputs.items()}
-    print_summary(statistics, written, interrupted)
+    print_summary(statistics, written, interrupted, None if budget is None else account(budget))
     return INTERRUPTED_EXIT_CODE if interrupted else 0
 
 
@@ -69,7 +73,7 @@ def _process(
             outputs["--output"].growing,
             frame_rate=settings.frame_rate,
             crf=options.encoding.crf,
-            preset=options.encoding.preset,
+            preset=options.encoding.encoder_preset,
         )
         if "--lighting" in outputs:
             sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)

@@ -11,13 +11,16 @@ from arlight.results.statistics import RunStatistics
 _NEARLY_ALL = 0.95
 
 
-def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interrupted: bool) -> None:
+def print_summary(
+    statistics: RunStatistics, written: Mapping[str, Path], interrupted: bool, deadline: str | None = None
+) -> None:
     """Print what a run amounts to and where its results are.
 
     Args:
         statistics: of the loop.
         written: files by what they hold.
         interrupted: whether Ctrl-C ended the run.
+        deadline: how well a deadline was held; None where there was none.
     """
     table = Table(show_header=False, box=None, pad_edge=False)
     state = " (interrupted)" if interrupted else ""
@@ -25,6 +28,8 @@ def print_summary(statistics: RunStatistics, written: Mapping[str, Path], interr
     counts = ", ".join(f"{count} {status}" for status, count in sorted(statistics.statuses.items(), reverse=True))
     table.add_row("sheet", f"{100.0 * statistics.tracked_share:.1f} % tracked ({counts})")
     table.add_row("speed", _speed(statistics))
+    if deadline is not None:
+        table.add_row("deadline", deadline)
     stages = ", ".join(f"{stage} {ms:.1f}" for stage, ms in statistics.median_ms.items())
     table.add_row("ms per frame", f"{stages} (medians)")
     for what, path in written.items():
@@ -38,6 +43,4 @@ def _speed(statistics: RunStatistics) -> str:
     if statistics.frames > 1:
         half, most = statistics.wall_quantile_ms(0.5), statistics.wall_quantile_ms(_NEARLY_ALL)
         text += f", a frame every {half:.1f} ms, {100.0 * _NEARLY_ALL:.0f} % within {most:.1f} ms"
-    if statistics.deadline_ms is not None:
-        text += f", {statistics.late} later than {statistics.deadline_ms:g} ms"
     return text

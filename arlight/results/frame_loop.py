@@ -107,7 +107,7 @@ class _FrameWork:
     def write(self, relit: tuple[FrameResult, float]) -> LogRecord:
         result, source_s = relit
         timings = {self.source: source_s, **result.timings_s}
-        if self.sinks.video is not None:
+        if self.sinks.video is not None and result.pose.status != "left out":
             started = perf_counter()
             self.sinks.video.write(result.composite)
             timings["encode"] = perf_counter() - started

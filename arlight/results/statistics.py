@@ -23,10 +23,6 @@ def _sample() -> EvenSample[float]:
 class RunStatistics:
     """Running totals of a loop over frames."""
 
-    deadline_ms: float | None = None
-    """Time that a frame may take in the loop; None where there is no such limit."""
-    late: int = 0
-    """Frames that took longer."""
     statuses: Counter[str] = field(default_factory=Counter)
     """Frames by status."""
     stages_ms: dict[str, EvenSample[float]] = field(default_factory=dict)
@@ -51,7 +47,6 @@ class RunStatistics:
             self.stages_ms[stage].add(ms)
         if not isnan(record.wall_ms):
             self.wall_ms.add(record.wall_ms)
-            self.late += self.deadline_ms is not None and record.wall_ms > self.deadline_ms
         if record.status == "tracked" and not isnan(record.chi2):
             self.chi2.add(record.chi2)
         if record.status == "tracked" and not isnan(record.unexplained):

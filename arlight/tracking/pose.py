@@ -5,7 +5,7 @@ from typing import Literal
 
 from arlight.camera import Pose
 
-Status = Literal["tracked", "coasting", "lost"]
+Status = Literal["tracked", "coasting", "lost", "left out"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,8 @@ class ProbePose:
     reprojection_rms_px: float
     """Rms distance of the fiducials from where the pose puts them [px]; nan when the sheet was not found."""
     status: Status
-    """`tracked`: measured in this frame; `coasting`: held from earlier frames; `lost`: unknown."""
+    """`tracked`: measured in this frame; `coasting`: held from earlier frames; `lost`: unknown; `left out`: not looked
+    for, to hold a deadline."""
     blur_px: float = float("nan")
     """Standard deviation of the picture's blur at the fiducials, beyond the pixel's own square [px]; nan if unknown."""
     markers_used: int = 0

@@ -43,12 +43,11 @@ def test_medians_are_of_what_was_measured():
     assert statistics.median_chi2 == 3.0
 
 
-def test_the_whole_loop_is_counted_against_the_deadline():
-    statistics = RunStatistics(deadline_ms=16.0)
+def test_the_time_from_frame_to_frame_is_told_by_its_quantiles():
+    statistics = RunStatistics()
     assert math.isnan(statistics.wall_quantile_ms(0.5))
     for wall_ms in [math.nan, 15.0, 17.0, 16.0, 40.0]:
         statistics.add(replace(record_of(0), wall_ms=wall_ms))
-    assert statistics.late == 2
     assert statistics.wall_quantile_ms(0.5) == pytest.approx(16.5)
     assert statistics.wall_quantile_ms(1.0) == 40.0
 

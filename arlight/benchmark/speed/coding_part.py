@@ -68,7 +68,7 @@ def _decode_by_opencv(path: Path) -> None:
 
 
 def _encode(frames: Sequence[Frame], encoding: EncodingSettings, path: Path) -> None:
-    with VideoWriter(path, frame_rate=FRAME_RATE, crf=encoding.crf, preset=encoding.preset) as writer:
+    with VideoWriter(path, frame_rate=FRAME_RATE, crf=encoding.crf, preset=encoding.encoder_preset) as writer:
         for frame in frames:
             writer.write(frame)
 

@@ -80,7 +80,9 @@ def _run(
     with VideoReader(path) as reader:
         begun = perf_counter()
         with Sinks() as sinks:
-            sinks.video = VideoWriter(folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.preset)
+            sinks.video = VideoWriter(
+                folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.encoder_preset
+            )
             header = LogHeader.of(clip.probe, clip.camera, path.name, "probe.json")
             sinks.log = LightingLogWriter(folder / "light.jsonl", header)
             with frame_loop(reader, pipeline, sinks) as records:
@@ -93,5 +95,5 @@ def _run(
 def _transcode(path: Path, encoding: EncodingSettings, target: Path) -> float:
     """Wall time of a plain transcode [s]."""
     begun = perf_counter()
-    plain_transcode(path, target, encoding.crf, encoding.preset)
+    plain_transcode(path, target, encoding.crf, encoding.encoder_preset)
     return perf_counter() - begun

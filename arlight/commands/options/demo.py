@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 import tyro
 
-from arlight.commands.encoding import EncodingOptions
+from arlight.commands.options.budget import BudgetOptions
 from arlight.commands.options.files import File, OptionalFile
 from arlight.commands.options.relighting import RelightingOptions
+from arlight.presets import PRESETS, EncodingSettings, PresetName
 from arlight.synthetic.motion import PathName
 
 
@@ -33,5 +34,14 @@ class DemoOptions:
     """How the camera moves."""
     order: int = 5
     """Order of the sheet, 1 to 8."""
+    preset: PresetName = "balanced"
+    """Speed against accuracy: what the options below are by default."""
+    budget: tyro.conf.OmitArgPrefixes[BudgetOptions] = field(default_factory=BudgetOptions)
     relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
-    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
+    encoding: tyro.conf.OmitArgPrefixes[EncodingSettings] = field(default_factory=EncodingSettings)
+
+    @classmethod
+    def of_preset(cls, name: PresetName) -> "DemoOptions":
+        """What the options are by default where a preset is asked for."""
+        preset = PRESETS[name]
+        return cls(preset=name, relighting=RelightingOptions(settings=preset.relight), encoding=preset.encoding)

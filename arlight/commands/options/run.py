@@ -4,10 +4,12 @@ from dataclasses import dataclass, field
 
 import tyro
 
-from arlight.commands.encoding import EncodingOptions
+from arlight.commands.options.budget import BudgetOptions
 from arlight.commands.options.files import OptionalFile, PositionalFile
 from arlight.commands.options.footage import FootageOptions
 from arlight.commands.options.relighting import RelightingOptions
+from arlight.presets import PRESETS, EncodingSettings, PresetName
+from arlight.tracker_settings import TrackerSettings
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,17 @@ class RunOptions:
     """An HTML page with the coefficients over time and the recovered light beside thumbnails."""
     render: bool = True
     """Draw the object and write the relit video; --no-render only estimates pose and lighting, without OpenGL."""
-    order: int | None = None
-    """Highest order of the light that is told and drawn with, 0 to the sheet's; the sheet's by default."""
+    preset: PresetName = "balanced"
+    """Speed against accuracy: what the options below are by default."""
+    budget: tyro.conf.OmitArgPrefixes[BudgetOptions] = field(default_factory=BudgetOptions)
+    tracker: tyro.conf.OmitArgPrefixes[TrackerSettings] = field(default_factory=TrackerSettings)
     footage: tyro.conf.OmitArgPrefixes[FootageOptions] = field(default_factory=FootageOptions)
     relighting: tyro.conf.OmitArgPrefixes[RelightingOptions] = field(default_factory=RelightingOptions)
-    encoding: tyro.conf.OmitArgPrefixes[EncodingOptions] = field(default_factory=EncodingOptions)
+    encoding: tyro.conf.OmitArgPrefixes[EncodingSettings] = field(default_factory=EncodingSettings)
+
+    @classmethod
+    def of_preset(cls, name: PresetName) -> "RunOptions":
+        """What the options are by default where a preset is asked for; the clip is still to be named."""
+        preset = PRESETS[name]
+        relighting = RelightingOptions(settings=preset.relight)
+        return cls(tyro.MISSING, preset=name, tracker=preset.tracker, relighting=relighting, encoding=preset.encoding)
