@@ -25,7 +25,11 @@ class MarkingRelighter:
     def __init__(self, need=None):
         self.calls = []
         self.samples = []
+        self.releases = 0
         self.need = need
+
+    def release(self):
+        self.releases += 1
 
     def render(self, frame, camera_from_probe, lighting, supersampling=None):
         self.calls.append((frame, camera_from_probe, lighting))
@@ -63,6 +67,25 @@ def test_what_is_drawn_is_the_frames_own_pose_and_light(probe, frames):
         assert result.composite is not frame
         assert "render" in result.timings_s
         assert set(result.estimate.timings_s) < set(result.timings_s)
+
+
+def test_the_halves_may_run_ahead_of_each_other(probe, frames):
+    relighter, whole = MarkingRelighter(), Pipeline(probe, CAMERA)
+    pipeline = Pipeline(probe, CAMERA, relighter)
+    estimates = [pipeline.estimate(frame) for frame in frames]
+    results = [pipeline.relight(frame, estimate) for frame, estimate in zip(frames, estimates, strict=True)]
+    for frame, result, call in zip(frames, results, relighter.calls, strict=True):
+        expected = whole.process(frame)
+        assert call[0] is frame
+        assert call[2] is result.lighting
+        np.testing.assert_allclose(result.lighting.coefficients, expected.lighting.coefficients, rtol=1e-9, atol=1e-12)
+
+
+def test_what_belongs_to_the_thread_that_relights_is_given_back(probe):
+    relighter = MarkingRelighter()
+    Pipeline(probe, CAMERA, relighter).release()
+    Pipeline(probe, CAMERA).release()
+    assert relighter.releases == 1
 
 
 def test_without_a_relighter_the_frame_is_handed_through(probe, frames):

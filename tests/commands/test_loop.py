@@ -28,7 +28,7 @@ class Loop:
 
     def estimate(self, frame):
         self._disturb(frame.index)
-        return FrameEstimate(frame.index, frame.time_s, ProbePose.lost(), None, None, {"track": 0.1})
+        return FrameEstimate(frame.index, frame.time_s, ProbePose.lost(), None, None, timings_s={"track": 0.1})
 
     def relight(self, frame, estimate):
         return FrameResult(frame, estimate, estimate.timings_s)

@@ -32,7 +32,7 @@ def frames(count):
 
 
 def estimate_of(frame, lighting=None):
-    return FrameEstimate(frame.index, frame.time_s, ProbePose.lost(), lighting, None, {"track": 0.1})
+    return FrameEstimate(frame.index, frame.time_s, ProbePose.lost(), lighting, None, timings_s={"track": 0.1})
 
 
 class Stages:

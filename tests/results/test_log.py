@@ -38,7 +38,8 @@ def estimate_of(index: int, rng: np.random.Generator) -> FrameEstimate:
         chi2=rng.uniform(0.5, 2.0),
     )
     pose = ProbePose(Pose.from_rvec(rng.normal(size=3), rng.normal(size=3) * 300), rng.uniform(0, 0.2), "tracked")
-    return FrameEstimate(index, index / 30, pose, lighting, lighting, {"track": 0.001}, rng.uniform(0.0, 0.1))
+    share = rng.uniform(0.0, 0.1)
+    return FrameEstimate(index, index / 30, pose, lighting, lighting, timings_s={"track": 0.001}, unexplained=share)
 
 
 def write_log(path, header, count=3):
@@ -73,7 +74,7 @@ def test_what_is_written_is_read_back(tmp_path, header):
 
 def test_unknown_values_are_null_never_nan(tmp_path, header):
     path = tmp_path / "log.jsonl"
-    lost = FrameEstimate(0, 0.0, ProbePose.lost(), None, None, {"track": math.nan})
+    lost = FrameEstimate(0, 0.0, ProbePose.lost(), None, None, timings_s={"track": math.nan})
     with LightingLogWriter(path, header) as writer:
         writer.write(LogRecord.of(lost, lost.timings_s))
     line = path.read_text().splitlines()[1]
