@@ -61,6 +61,13 @@ EXPORT double color_spread(int64_t n, const double *colorful, double irradiance,
     return next_color_spread(n, colorful, irradiance, difference, variance, 1, last);
 }
 
+/* Looks for so many amplitudes of the reflection. */
+static void look_for(ChannelFit *f, int64_t amplitudes)
+{
+    f->field = amplitudes;
+    f->width = (amplitudes + 2 + LANES - 1) / LANES * LANES;
+}
+
 /* Fits a channel; green comes first. Weights and solution are refined `passes` times, and the nuisance with the last, or
    with each. */
 EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t settle)
@@ -73,11 +80,13 @@ EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t 
     expect_light(f);
     expect_pattern(f);
     for (int64_t pass = 0; pass < passes; pass++) {
+        int whole = settle || pass == passes - 1;
+        look_for(f, whole && channel == GREEN ? f->modes : f->coarse);
         row_model(f);
         block_equations(f);
         solve_shared(f, packed);
         miss(f, packed[0], 0);
-        if (settle || pass == passes - 1)
+        if (whole)
             step_nuisance(f, packed, &step);
         reweigh(f);
     }

@@ -12,15 +12,18 @@ typedef struct {
     MeasuredBlocks *m;
     int64_t channel;
     int64_t frequencies;    /* that are fitted, without (0, 0) */
-    int64_t field;          /* amplitudes of the reflection; the last one is green's own pattern */
-    int64_t width;          /* of the shared unknowns' equations: field, L_0, right-hand side, in whole lanes */
+    int64_t modes;          /* amplitudes of the reflection; the second is green's own pattern */
+    int64_t coarse;         /* of which so many, the smoothest, suffice to tell lamps and stray blocks, and how the
+                               reflection in red and blue strays from green's pattern */
+    int64_t row;            /* length of a row of the basis: all amplitudes and two more, in whole lanes */
+    int64_t field, width;   /* amplitudes that are looked for at the time, and the same for these */
     int64_t wide;           /* length of a row of coefficients in whole lanes */
     const int32_t *first;   /* (frequencies + 2) first block of each frequency; those without pattern come first */
     const double *spread;   /* (2k - 1) prior deviation of the coefficients for an irradiance of 1, the first as it is */
     const double *colorful; /* (2k - 1) the same of red's and blue's difference from green */
     const double *mean_model;  /* (stride) deviation of the model's error in the means, relative to white */
-    double *basis;          /* (stride, width) reflection field of each block, before Fresnel's factor */
-    double *basis_planes;   /* (field, stride) the same, one plane an amplitude */
+    double *basis;          /* (stride, row) reflection field of each block, before Fresnel's factor */
+    double *basis_planes;   /* (modes, stride) the same, one plane an amplitude */
     const double *rows;     /* (3, 7, stride) response before blur */
     const double *lower;    /* (7, stride) of the lower face */
     double white_per_irradiance;
@@ -40,16 +43,16 @@ typedef struct {
     double *reflection;     /* (3, stride) */
     double *predicted;      /* (3, 7, stride) */
     double *planes;         /* (PLANES, stride) see below */
-    double *shared;         /* (width, width) equations of the shared unknowns */
-    double *stacked;        /* (stride + 8, width) rows whose products they are */
+    double *shared;         /* (row, row) equations of the shared unknowns */
+    double *stacked;        /* (stride, row) rows whose products they are */
     double *frequency;      /* (frequencies + 1, FREQUENCY) what each frequency's own equations leave */
     double *expected;       /* (2k - 1) prior mean */
     double *certain;        /* (2k - 1) prior precision */
-    double *solution;       /* (width) of the shared unknowns */
-    double *carried;        /* (width, 8) change of the shared unknowns with the nuisance */
+    double *solution;       /* (row) of the shared unknowns */
+    double *carried;        /* (row, 8) change of the shared unknowns with the nuisance */
     double *carried_light;  /* (2k, 8) change of the coefficients */
-    double *fields;         /* (width, stride) the blocks' fields, freed of all other shared unknowns */
-    double *certainty;      /* (width + 8, wide) rows whose products are the covariance */
+    double *fields;         /* (row, stride) the blocks' fields, freed of all other shared unknowns */
+    double *certainty;      /* (row + 8, wide) rows whose products are the covariance */
     double *products;       /* (wide, wide) */
     double *small;          /* (most blocks of a frequency + 8)^2 */
     double chi2;            /* result: robust chi-square a row */

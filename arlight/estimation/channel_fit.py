@@ -16,12 +16,15 @@ from arlight.estimation.measured_blocks import CHANNELS, MeasuredBlocks
 from arlight.estimation.nuisance import Nuisance
 from arlight.estimation.prior import color_stddev, prior_stddev
 from arlight.estimation.response import BlockResponse
-from arlight.native import Workspace, library
+from arlight.native import Workspace, address, library
 from arlight.tracking.block_means import ROWS
 
 Array = NDArray[np.float64]
 
 GREEN = 1
+_COARSE = 2 / 3
+"""Share of the reflection's amplitudes, the smoothest, that suffices to tell lamps and stray blocks, and how the
+reflection in red and blue strays from green's pattern."""
 _LANES = 4
 _NUISANCES, _WIDE, _FREQUENCY = 5, 8, 8
 _native = library(__file__, "channel_fit")
@@ -34,7 +37,8 @@ class _ChannelFit(Workspace):
 
     _fields_ = (
         ("m", ctypes.c_void_p),
-        *((name, ctypes.c_int64) for name in ("channel", "frequencies", "field", "width", "wide")),
+        *((name, ctypes.c_int64) for name in ("channel", "frequencies", "modes", "coarse", "row")),
+        *((name, ctypes.c_int64) for name in ("field", "width", "wide")),
         *((name, ctypes.c_void_p) for name in ("first", "spread", "colorful", "mean_model", "basis")),
         *((name, ctypes.c_void_p) for name in ("basis_planes", "rows", "lower")),
         *((name, ctypes.c_double) for name in ("white_per_irradiance", "lamp_freedom", "weight_freedom", "weakest")),
@@ -108,7 +112,7 @@ class SheetFit:
         self._first = np.searchsorted(response.places[sequence, 1], [0, *range(1, 2 * len(frequencies), 2)])
         self._frequencies = frequencies
         rows = np.zeros((stride, width))
-        rows[: len(sequence), :modes] = basis[sequence]
+        rows[: len(sequence), 0], rows[: len(sequence), 2:field] = basis[sequence, 0], basis[sequence, 1:]
         model = np.zeros(stride)
         model[: len(sequence)] = mean_model[sequence]
         self.nuisances, self.scales = np.zeros((CHANNELS, _NUISANCES)), np.ones((CHANNELS, 2))
@@ -117,8 +121,9 @@ class SheetFit:
         self.reflection, self.predicted = np.zeros((CHANNELS, stride)), np.zeros((CHANNELS, ROWS, stride))
         self._blocks = blocks
         self.native = _ChannelFit(
-            m=ctypes.addressof(blocks.native), field=field, width=width, white_per_irradiance=white_per_irradiance,
-            lamp_freedom=lamps.FREEDOM, weight_freedom=robust_weights.FREEDOM, weakest=stripe_rows.WEAKEST_TRANSFER,
+            m=ctypes.addressof(blocks.native), modes=field, coarse=2 + int(_COARSE * (modes - 1)), row=width,
+            white_per_irradiance=white_per_irradiance, lamp_freedom=lamps.FREEDOM,
+            weight_freedom=robust_weights.FREEDOM, weakest=stripe_rows.WEAKEST_TRANSFER,
         )  # fmt: skip
         self.native.hold({
             "first": self._first.astype(np.int32), "spread": prior_stddev(frequencies, 1.0),
@@ -149,7 +154,7 @@ class SheetFit:
         self.packed, self.covariance = np.empty((CHANNELS, unknown)), np.empty((CHANNELS, unknown, unknown))
         native = self.native
         native.frequencies, native.wide = count - 1, _whole(unknown)
-        native.packed, native.covariance = self.packed.ctypes.data, self.covariance.ctypes.data
+        native.packed, native.covariance = address(self.packed, np.float64), address(self.covariance, np.float64)
         self.nuisances[GREEN] = nuisance.values
         self.scales[:] = nuisance.error_scale
         self.spreads[0], self.spreads[2] = nuisance.color_spread

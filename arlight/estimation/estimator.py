@@ -5,7 +5,7 @@ sharpest of the three, and the reflection in red and blue follows its pattern, f
 """
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from arlight.estimation.resampling import Resampling, resampling
 from arlight.estimation.response import BlockResponse
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import orders_up_to, unpack_real
-from arlight.native import library
+from arlight.native import address, library
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
@@ -49,6 +49,10 @@ class Estimate:
     """Blur and lower face as the stripes show them."""
     unexplained: float
     """Share of the stripes that no light explains on this sheet, as green shows it; nan where they are not resolved."""
+
+    def with_stripes_elsewhere(self, measured: NDArray[np.bool_], stripes: Array) -> "Estimate":
+        """The same, with the stripes (blocks, 7, 3) of an earlier frame in the blocks that were not measured."""
+        return replace(self, stripes=np.where(measured[:, None, None], self.stripes, stripes))
 
 
 class LightingEstimator:
@@ -112,18 +116,18 @@ class LightingEstimator:
         """
         start, fit = nuisance or Nuisance(), self._fit
         count = len(self._frequencies) if order is None else int(np.sum(orders_up_to(self._frequencies, order)))
-        blocks = fit.begin(count, start)
-        self._measured.gather(means, blocks)
+        used = fit.begin(count, start)
+        self._measured.gather(means, used)
         white = self._measured.white
         if start.blocks is None:
             fit.forget()
         else:
             np.multiply(start.blocks[0], white[GREEN] ** 2, out=fit.lamps[GREEN])
             fit.weights[GREEN] = start.blocks[1]
-        self._response.fill(blocks, start.shape)
+        self._response.fill(used, start.shape)
         if start.shape is None:
             fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
-            self._response.fill(blocks, _shape(fit.packed[GREEN]))
+            self._response.fill(used, _shape(fit.packed[GREEN]))
             green = fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
         else:
             green = fit.fit(GREEN, self._iterations)
@@ -133,15 +137,18 @@ class LightingEstimator:
             ctypes.addressof(self._measured.native),
             fit.native.predicted,
             fit.native.reflection,
-            stripes.ctypes.data,
-            reflection.ctypes.data,
+            address(stripes, np.float64),
+            address(reflection, np.float64),
         )
+        blocks = np.empty((2, len(fit.lamps[GREEN])))
+        np.multiply(fit.lamps[GREEN], 1.0 / white[GREEN] ** 2, out=blocks[0])
+        blocks[1] = fit.weights[GREEN]
         learnt = Nuisance.of(
             fit.nuisances[GREEN],
             color_spread=(fit.spreads.item(0), fit.spreads.item(2)),
             error_scale=tuple(map(tuple, fit.scales.tolist())),
             shape=_shape(fit.packed[GREEN]),
-            blocks=np.stack([fit.lamps[GREEN] / white[GREEN] ** 2, fit.weights[GREEN]]),
+            blocks=blocks,
         )
         return Estimate(self._lighting(count, time_s, chi2), stripes, reflection, learnt, green.unexplained)
 

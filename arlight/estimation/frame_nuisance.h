@@ -125,7 +125,7 @@ static HOT void shared_slopes(const ChannelFit *f, Step *s)
         for (int k = 0; k < WIDE; k++)
             sum[k] = splat(0.0);
         for (int64_t i = 0; i < f->m->blocks; i++) {
-            lanes row = load(f->basis + i * f->width + j);
+            lanes row = load(f->basis + i * f->row + j);
             for (int k = 0; k < NUISANCES; k++)
                 sum[k] += cross(f, COLUMNS, k, i) * row;
         }
@@ -153,11 +153,11 @@ static HOT void carry_frequency(const ChannelFit *f, int64_t g)
         /* products of the frequency's columns with four amplitudes of the field */
         lanes with[2] = {splat(0.0), splat(0.0)};
         for (int64_t i = f->first[g]; i < f->first[g + 1]; i++) {
-            lanes row = load(f->basis + i * f->width + j);
+            lanes row = load(f->basis + i * f->row + j);
             with[0] += real[i] * row;
             with[1] += imaginary[i] * row;
         }
-        for (int l = 0; l < LANES; l++) {
+        for (int l = 0; l < LANES && j + l < f->field; l++) {
             lanes a = load(f->carried + (j + l) * WIDE), b = load(f->carried + (j + l) * WIDE + LANES);
             for (int k = 0; k < 2; k++) {
                 left[k] -= with[k][l] * a;

@@ -22,7 +22,7 @@ _native.amplitude_of_field.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c
 
 
 def reflection_basis(centers_mm: Array) -> Array:
-    """Basis (blocks, k): a constant, then fields whose amplitudes are independent with unit variance.
+    """Basis (blocks, k): a constant, then fields whose amplitudes are independent with unit variance, smoothest first.
 
     Args:
         centers_mm: (blocks, 2) centres of the blocks [mm].
@@ -30,7 +30,8 @@ def reflection_basis(centers_mm: Array) -> Array:
     distance = np.linalg.norm(centers_mm[:, None] - centers_mm[None], axis=-1)
     scaled = np.sqrt(3.0) * distance / _LENGTH_MM
     values, vectors = np.linalg.eigh((1.0 + scaled) * np.exp(-scaled))
-    kept = values > _KEPT_VARIANCE * values[-1]
+    values, vectors = values[::-1], vectors[:, ::-1]
+    kept = values > _KEPT_VARIANCE * values[0]
     return np.concatenate([np.ones((len(centers_mm), 1)), vectors[:, kept] * np.sqrt(values[kept])], axis=1)
 
 

@@ -15,19 +15,20 @@ typedef struct {
     int64_t columns;            /* 3, or 5 where the film has a second harmonic */
     int64_t unknown;            /* real coefficients of the light, 2k - 1, filled up to whole lanes */
     int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0: no such light */
+    int64_t parts;              /* of such light's series that are not 0 */
     int64_t folded;             /* whether light of twice the frequency is counted with that of L_0, by the shape */
     double index;               /* of refraction */
     const double *film;         /* (9, stride) series of the transmittance */
     const double *radiosity;    /* (columns, 9, stride) series of the paper's radiosity for unit coefficients */
-    const double *gathered;     /* (9, 9, stride) radiosity for unit irradiance, part by part */
-    const double *echo;         /* (kinds, 9, unknown) irradiance from light that went back and forth */
+    const double *gathered;     /* (9, parts, stride) radiosity for unit irradiance, part by part */
+    const double *echo;         /* (kinds, parts, unknown) irradiance from light that went back and forth */
     const int32_t *kind;        /* (stride) of each block */
     const int32_t *overtone;    /* (stride) place of Re L_2n; 0 for none */
     const double *passed_twice; /* (stride) share of the light that a second crossing of the film leaves */
     const double *shape;        /* (unknown) coefficients relative to L_0, as far as known */
     const double *phasor;       /* (2, stride) mean of exp(-i b) over the view */
     const double *cosine;       /* (stride) of the angle between viewer and normal */
-    double *echoed;             /* (kinds, 9) irradiance for the shape */
+    double *echoed;             /* (kinds, parts) irradiance for the shape */
     double *rows;               /* (columns, 7, stride) result */
     double *mirror;             /* (7, stride) result: of the lower face where the upper face mirrors 1 */
 } Response;
@@ -119,14 +120,14 @@ INLINE Series lit(const Response *r, int64_t block)
 {
     Series s = series_at(r->radiosity, r->stride, block);
     lanes irradiance[PARTS];
-    for (int j = 0; j < PARTS && r->kinds; j++)
+    for (int j = 0; j < r->parts; j++)
         for (int k = 0; k < LANES; k++)
-            irradiance[j][k] = r->echoed[r->kind[block + k] * PARTS + j];
+            irradiance[j][k] = r->echoed[r->kind[block + k] * r->parts + j];
     lanes added[PARTS];
     for (int i = 0; i < PARTS; i++) {
         added[i] = splat(0.0);
-        for (int j = 0; j < PARTS && r->kinds; j++)
-            added[i] += load(r->gathered + (i * PARTS + j) * r->stride + block) * irradiance[j];
+        for (int j = 0; j < r->parts; j++)
+            added[i] += load(r->gathered + (i * r->parts + j) * r->stride + block) * irradiance[j];
     }
     for (int k = 3; k < r->columns && r->folded; k++) {
         lanes share;
@@ -145,7 +146,7 @@ INLINE Series lit(const Response *r, int64_t block)
 
 static HOT void echo_of_shape(const Response *r)
 {
-    for (int64_t i = 0; i < r->kinds * PARTS; i++) {
+    for (int64_t i = 0; i < r->kinds * r->parts; i++) {
         lanes sum = splat(0.0);
         for (int64_t k = 0; k < r->unknown; k += LANES)
             sum += load(r->echo + i * r->unknown + k) * load(r->shape + k);

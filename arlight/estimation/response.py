@@ -14,7 +14,7 @@ from arlight.estimation.layer_series import HARMONICS as STACK_HARMONICS
 from arlight.estimation.layer_series import real_parts
 from arlight.estimation.radiance_prior import predicted_sky, received_operator, sky_directions
 from arlight.estimation.resampling import measured_frequencies
-from arlight.estimation.slab_echo import uniform_light
+from arlight.estimation.slab_echo import Echo, uniform_light
 from arlight.estimation.stack import PaperLight, paper_light
 from arlight.native import Workspace, library
 from arlight.probe.assembly import Assembly
@@ -28,6 +28,8 @@ ComplexArray = NDArray[np.complex128]
 _LANES = 8
 """Planes are filled up to a multiple of this: the compiled code handles four or eight blocks together."""
 _PARTS = 2 * STACK_HARMONICS + 1
+_SILENT = 1e-9
+"""Light that goes back and forth, relative to the most, below which a harmonic of it counts as nothing."""
 _native = library(__file__, "response")
 
 
@@ -35,7 +37,7 @@ class _Response(Workspace):
     """As in response.c."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("blocks", "stride", "columns", "unknown", "kinds", "folded")),
+        *((name, ctypes.c_int64) for name in ("blocks", "stride", "columns", "unknown", "kinds", "parts", "folded")),
         ("index", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in ("film", "radiosity", "gathered", "echo", "kind", "overtone")),
         *((name, ctypes.c_void_p) for name in ("passed_twice", "shape", "phasor", "cosine")),
@@ -107,17 +109,21 @@ class BlockResponse:
         radiosity = np.moveaxis(real_parts(np.moveaxis(light.radiosity, 2, 1)) * known[:, :, None], 0, 2)
         tables = {"film": film.T, "radiosity": radiosity, "passed_twice": passed_twice}
         kind = np.zeros(stride, np.int32)
-        self._native.kinds = 0
         if light.echo is not None:
-            self._native.kinds = len(light.echo.irradiance)
             kind[: self._count] = light.echo.kind[self.sequence]
-            tables["gathered"] = np.moveaxis(_real_matrix(light.gathered), 0, 2)
-            echo = np.zeros((self._native.kinds, _PARTS, len(self._shape)))
-            echo[:, :, : light.echo.irradiance.shape[2]] = np.swapaxes(
-                real_parts(np.swapaxes(light.echo.irradiance, 1, 2)), 1, 2
-            )
-            self._native.hold({"echo": echo, "echoed": np.zeros((len(echo), _PARTS))})
+            tables["gathered"] = self._hold_echo(light.echo, _real_matrix(light.gathered))
         self._native.hold({"kind": kind, **{name: self._planes(table, stride) for name, table in tables.items()}})
+
+    def _hold_echo(self, echo: Echo, gathered: Array) -> Array:
+        """Keep the echo's irradiance; returns what gathers it (9, parts, blocks), as far as it is not 0."""
+        irradiance = np.swapaxes(real_parts(np.swapaxes(echo.irradiance, 1, 2)), 1, 2)
+        heard = np.abs(irradiance).max(axis=(0, 2))
+        parts = int(np.flatnonzero(heard > _SILENT * heard.max(initial=0.0)).max(initial=-1)) + 1
+        table = np.zeros((len(irradiance), parts, len(self._shape)))
+        table[:, :, : irradiance.shape[2]] = irradiance[:, :parts]
+        self._native.kinds, self._native.parts = table.shape[:2]
+        self._native.hold({"echo": table, "echoed": np.zeros(table.shape[:2])})
+        return np.moveaxis(gathered[:, :, :parts], 0, 2)
 
     def _planes(self, table: Array, stride: int) -> Array:
         """A table (..., blocks) in the compiled order, with room for whole lanes."""

@@ -97,11 +97,11 @@ static HOT void stack_group(const ChannelFit *f, int64_t from, int64_t n, const 
     reduce_group(f, from, n, own, k);
     factorise_group(n, k);
     for (int64_t c = 0; c < f->width; c += LANES) {
-        const double *fields = f->basis + from * f->width + c;
+        const double *fields = f->basis + from * f->row + c;
         for (int64_t i = 0; i < n; i++) {
-            lanes sum = k[i * w + i] * load(fields + i * f->width);
+            lanes sum = k[i * w + i] * load(fields + i * f->row);
             for (int64_t j = i + 1; j < n; j++)
-                sum += k[i * w + j] * load(fields + j * f->width);
+                sum += k[i * w + j] * load(fields + j * f->row);
             store(rows + i * f->width + c, sum);
         }
     }
@@ -121,7 +121,7 @@ static void start_shared(const ChannelFit *f)
         f->shared[i] = 0.0;
     /* the mean reflection and red's and blue's share of green's pattern may be anything up to white */
     for (int64_t i = 0; i < f->field; i++) {
-        double deviation = i == 0 || i == f->field - 1 ? white : amplitude;
+        double deviation = i <= 1 ? white : amplitude;
         f->shared[i * (f->width + 1)] = 1.0 / (deviation * deviation);
     }
     f->shared[f->field * (f->width + 1)] = f->certain[0];
@@ -135,7 +135,7 @@ static HOT void field_of_blocks(const ChannelFit *f)
     for (int64_t i = 0; i < f->m->blocks; i++) {
         lanes sum = splat(0.0);
         for (int64_t c = 0; c < f->width; c += LANES)
-            sum += load(f->basis + i * f->width + c) * load(f->solution + c);
+            sum += load(f->basis + i * f->row + c) * load(f->solution + c);
         field[i] = total(sum);
     }
 }

@@ -45,6 +45,9 @@ def address(array: NDArray[np.generic], dtype: type) -> int:
     """
     if array.dtype != dtype or not array.flags.c_contiguous:
         raise TypeError(f"expected a C-contiguous array of {np.dtype(dtype)}, found {array.dtype}, {array.flags}")
+    if array.flags.writeable and array.size:
+        # a quarter of the time that `array.ctypes` takes
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     return array.ctypes.data
 
 

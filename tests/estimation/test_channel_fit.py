@@ -102,7 +102,9 @@ def wide_fit(fitted, channel, start, lamp, weight, expected, deviation, extra_pa
     usable = usable_rows(means, transfer)
     noise = row_noise(means, channel, level, fitted.mean_model, transfer)
     fresnel = response_face(fitted)
-    basis = fitted.basis * (fresnel / fresnel.mean())[:, None]
+    # of red and blue only the smoothest part strays from green's pattern
+    smooth = fitted.basis if extra_pattern is None else fitted.basis[:, : fitted.sheet.native.coarse - 1]
+    basis = smooth * (fresnel / fresnel.mean())[:, None]
     field_deviation = np.full(basis.shape[1], fitted.blocks.native.amplitude[channel])
     field_deviation[0] = level
     if extra_pattern is not None:
