@@ -22,7 +22,8 @@ typedef struct {
     double frequency_x, frequency_y, kept; /* what averaging over a cell leaves of the stripes */
     double luma[3];                        /* mean, cos, sin */
     double measured[2][3], expected[2][3]; /* Cb and Cr: mean, cos, sin */
-    double darkest, mean_luma;             /* of the block's pixels */
+    double mean[3];                        /* of all its cells */
+    float darkest;                         /* luma of any */
     int patterned;
 } Chroma;
 
@@ -32,29 +33,39 @@ typedef struct {
     double shift_x, shift_y; /* where it lies [px] */
 } Stream;
 
-/* Sums over the cells of one block: values Cb, Cr and the mean of their luma. */
-static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, Sums *sums, double mean[3], float *darkest)
+/* Sum and least of a list. */
+static HOT float sum_list(int total, const float *restrict values, float *least)
+{
+    float sum = 0.0f;
+    for (int i = 0; i < total; i++)
+        sum += values[i];
+    *least = total ? values[0] : 0.0f;
+    for (int i = 1; i < total; i++)
+        *least = values[i] < *least ? values[i] : *least;
+    return sum;
+}
+
+/* Sums over the cells of one block: values Cb, Cr and the mean of their luma, as far as chroma is scaled with it. */
+static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
     Span span = span_of(b, block, grid);
     if (span.total > b->limit / 2)
         thin_out(b, &span, (int)(b->limit / 2));
-    list_points(b, block, grid, &span);
-    float *c = list_of(b, PHASE_LIST), *s = list_of(b, CODE_LIST + 3), *values = list_of(b, CODE_LIST);
-    list_codes(b, 1, &span, values);
-    list_codes(b, 2, &span, values + b->room);
-    list_mean_luma(b, &span, values + 2 * b->room);
+    list_points(b, block, grid, &span, CELLS);
+    float *c = list_of(b, PHASE_LIST), *s = list_of(b, SINE_LIST), *values = list_of(b, CODE_LIST);
+    float *luma = list_of(b, LIGHT_LIST);
     turn_all(span.total, c, s);
-    for (int k = 0; k < LISTS + 1; k++)
+    if (limited)
+        limit_luma(b->harmonics[block], span.total, limit_of(b, block), luma, c, s, values + 2 * b->room);
+    else
+        memcpy(values + 2 * b->room, luma, (size_t)span.total * sizeof *luma);
+    for (int k = PHASE_LIST; k <= LIGHT_LIST; k++)
         clear_rest(list_of(b, k), span.total);
-    int harmonics = b->harmonics[block] > 0;
-    sum_block(harmonics, span.total, c, s, list_of(b, X_LIST), list_of(b, Y_LIST), values, b->room, sums);
-    float least = 1.0f;
-    for (int i = 0; i < span.total; i++)
-        least = values[2 * b->room + i] < least ? values[2 * b->room + i] : least;
-    *darkest = least;
+    sum_block(b->harmonics[block] > 0, span.total, c, s, list_of(b, X_LIST), list_of(b, Y_LIST), values, b->room, sums);
     double over = span.total ? 1.0 / span.total : 0.0;
-    for (int k = 0; k < 3; k++)
-        mean[k] = sums->right[(k + 2) % 3][0] * over;
+    chroma->mean[0] = sum_list(span.total, luma, &chroma->darkest) * over;
+    chroma->mean[1] = sums->right[0][0] * over;
+    chroma->mean[2] = sums->right[1][0] * over;
 }
 
 /* What averaging over a cell leaves of stripes. */
@@ -73,9 +84,7 @@ static void expect(const Blocks *b, int block, Chroma *chroma)
 {
     const double *y = chroma->luma;
     for (int k = 0; k < 2; k++) {
-        float hue[HUE];
-        for (int i = 0; i < HUE; i++)
-            hue[i] = b->hue[(k * HUE + i) * b->blocks + block];
+        const float *hue = b->hue + (int64_t)block * HUES * HUE + k * HUE;
         double *e = chroma->expected[k];
         e[0] = y[0] * hue[0] + 0.5 * (y[1] * hue[1] + y[2] * hue[2]) + hue[HUE - 1];
         e[1] = y[0] * hue[1] + y[1] * hue[0] + 0.5 * (y[1] * hue[3] + y[2] * hue[4]);
@@ -89,8 +98,7 @@ static void fit_cells(const Blocks *b, const int32_t *order, int some, const Sum
     SmallFits fits;
     fits.rights = 3;
     int harmonics = b->harmonics[order[0]] > 0;
-    for (int l = 0; l < FITS; l++)
-        fill_fit(&fits, l, harmonics, sums + (l < some ? l : 0));
+    fill_fits(&fits, sums, some, harmonics, 1);
     solve_fits(&fits);
     for (int l = 0; l < some; l++) {
         Chroma *out = chroma + l;
@@ -166,28 +174,23 @@ static double correct(const Stream *stream, const Chroma *a, double correction[2
     return gain * seen;
 }
 
-/* Coefficients that make a block's encoded RGB of luma Y and phase: Y times a series, plus constant and sinusoid. The
- * mean correction grows with luma above the block's darkest: colour differences scale with the light of the stripes. */
-static void mix_colour(const Blocks *b, int block, const Chroma *a, double correction[2][3])
+/* What makes a block's encoded RGB of luma and phase. The mean correction grows with luma above the block's darkest:
+ * colour differences scale with the light of the stripes. */
+static void mix_tints(const Blocks *b, int block, const Chroma *a, double correction[2][3])
 {
     double darkest = fmax(fmin(a->darkest, a->luma[0] - hypot(a->luma[1], a->luma[2])), 0.0);
-    double over = 1.0 / fmax(a->mean_luma - darkest + DARKEST, DARKEST), base = (DARKEST - darkest) * over;
-    float *out = b->colour + (int64_t)block * COLOUR;
-    for (int c = 0; c < CHANNELS; c++, out += TINT) {
-        const double *matrix = b->rgb_from_ycc + 3 * c;
-        for (int i = 0; i < TINT; i++)
-            out[i] = 0.0f;
-        out[0] = (float)matrix[0];
-        for (int k = 0; k < 2; k++) {
-            float factor = (float)matrix[1 + k];
-            const float *hue = b->hue + k * HUE * b->blocks + block;
-            for (int i = 0; i < ROWS; i++)
-                out[i] += factor * hue[i * b->blocks];
-            out[0] += factor * (float)(correction[k][0] * over);
-            out[ROWS] += factor * (hue[ROWS * b->blocks] + (float)(correction[k][0] * base));
-            out[ROWS + 1] += factor * (float)correction[k][1];
-            out[ROWS + 2] += factor * (float)correction[k][2];
-        }
+    double over = 1.0 / fmax(a->mean[0] - darkest + DARKEST, DARKEST), base = (DARKEST - darkest) * over;
+    const float *hue = b->hue + (int64_t)block * HUES * HUE;
+    for (int c = 0; c < CHANNELS; c++) {
+        const double *matrix = b->rgb_from_ycc + 3 * c, last = (double)(b->entries - 1);
+        double blue = matrix[1] * last, red = matrix[2] * last, mean = blue * correction[0][0] + red * correction[1][0];
+        Tint *tint = b->tints + block * CHANNELS + c;
+        tint->luma = (float)(matrix[0] * last + mean * over);
+        for (int i = 0; i < ROWS; i++)
+            tint->series[i] = (float)blue * hue[i] + (float)red * hue[HUE + i];
+        tint->level[0] = (float)(mean * base + blue * hue[ROWS] + red * hue[HUE + ROWS]);
+        tint->level[1] = (float)(blue * correction[0][1] + red * correction[1][1]);
+        tint->level[2] = (float)(blue * correction[0][2] + red * correction[1][2]);
     }
 }
 

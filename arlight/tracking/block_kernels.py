@@ -20,8 +20,9 @@ Array = NDArray[np.float64]
 _LANES, _STEP = 16, 8
 _LINE = 16
 """Floats of a cache line."""
-_EDGES, _SURFACES, _CUBIC, _COLOUR = 8, 3, 4, 3 * (ROWS + 3)
-_LISTS = 12 + 16
+_EDGES, _CUBIC, _TERMS = 8, 4, 16
+_TINT = 1 + ROWS + 3
+_LISTS = 10 + 23
 _SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
 _PATTERNED, _WHITE, _WANTED = 1, 2, 4
 _RESULTS = (("values", ROWS * 3), ("covariance", ROWS * ROWS), ("variance", 3), ("shading", 3), ("cycles", 2),
@@ -47,7 +48,7 @@ class _Shared(Workspace):
         *((name, ctypes.c_void_p) for name in ("seen", "harmonics", "frequency", "margin", "gain", "box", "edges")),
         *((name, ctypes.c_void_p) for name in ("surfaces", "look")),
         *((name, ctypes.c_int64) for name in ("limit", "room")),
-        *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "places", "lists", "hue", "colour")),
+        *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "places", "codes", "lists", "hue", "tints")),
         *((name, ctypes.c_void_p) for name in ("mean_code", "ceiling", "sums", "gathered")),
         ("planes", ctypes.c_void_p * 3),
         ("stride", ctypes.c_int64 * 3),
@@ -78,7 +79,7 @@ class BlockKernels:
         self.flags = np.zeros(n, np.uint8)
         self.pose = np.zeros(12)
         self.stripes = np.zeros((n, ROWS, 3))
-        self.hue = np.zeros((2, ROWS + 1, n), np.float32)
+        self.hue = np.zeros((n, 3, ROWS + 1), np.float32)
         self.mean_code = np.zeros((n, 3))
         self.gathered = np.zeros(n, np.int32)
         self.harmonics = np.zeros(n, np.int32)
@@ -98,15 +99,16 @@ class BlockKernels:
                 "gain": np.ones(n, np.float32),
                 "box": np.zeros((4, n), np.float32),
                 "edges": np.zeros((_EDGES, 3, n), np.float32),
-                "surfaces": np.zeros((_SURFACES, _CUBIC, _CUBIC, n), np.float32),
+                "surfaces": _aligned((n, _CUBIC * _TERMS)),
                 "look": np.zeros((2, 5, n), np.float32),
                 "order": np.zeros(n, np.int32),
                 "spans": np.zeros((2, height), np.int32),
-                "rows": np.zeros((_SURFACES * _CUBIC, height), np.float32),
+                "rows": _aligned((height, _TERMS)),
                 "places": _aligned((3, room)).view(np.int32),
+                "codes": np.zeros((3, room), np.uint16),
                 "lists": _aligned((_LISTS, room)),
                 "hue": self.hue,
-                "colour": np.zeros((n, _COLOUR), np.float32),
+                "tints": np.zeros((n, 3, _TINT), np.float32),
                 "mean_code": self.mean_code,
                 "ceiling": np.zeros((n, 3), np.float32),
                 "sums": np.zeros((n, _SUMS), np.float32),
@@ -232,7 +234,13 @@ def _describe(shared: _Shared, format_: PixelFormat) -> None:
 
 
 def _rounds(camera: Camera) -> int:
-    return 0 if not np.any(camera.distortion) else 8
+    """How often the compiled code must undo the distortion, all over the picture."""
+    width, height = camera.image_size
+    x, y = np.meshgrid(np.linspace(0.0, width - 1.0, 9), np.linspace(0.0, height - 1.0, 9))
+    pixels = np.stack([x, y], axis=-1).reshape(-1, 2)
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = camera_parameters(camera)[4:16]
+    pinhole = Camera(camera.image_size, camera.camera_matrix, np.zeros(5))
+    return 0 if not np.any(camera.distortion) else 5
 
 
 @cache

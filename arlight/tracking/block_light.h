@@ -11,37 +11,41 @@ typedef struct {
     float *cosine, *sine, *x, *y, *light;
 } Pixels;
 
-INLINE int32_t place_of(float encoded, float last)
+/* The entry of a table nearest to a value between 0 and `last`, its last entry. */
+INLINE int32_t place_of(float value, int32_t last)
 {
-    float at = encoded * last + 0.5f;
-    at = at > 0.0f ? at : 0.0f;
-    return (int32_t)(at < last ? at : last);
+    int32_t at = (int32_t)(value + 0.5f);
+    at = at > 0 ? at : 0;
+    return at < last ? at : last;
 }
 
-/* Places in the decoding table of one encoded channel that follows from luma and phase. */
-INLINE void colour_pixels(int harmonics, int total, const float *restrict tint, float last,
-                                 const float *restrict luma, const float *restrict c, const float *restrict s,
-                                 int32_t *restrict places)
+/* Places in the decoding table of one channel that follows from luma and phase. */
+INLINE void colour_pixels(int harmonics, int total, const Tint *from, int32_t last, const float *restrict luma,
+                          const float *restrict limited, const float *restrict c, const float *restrict s,
+                          int32_t *restrict places)
 {
+    const Tint tint = *from;
     int steps = (total + STEP - 1) & -STEP;
     for (int i = 0; i < steps; i++) {
-        float ck = c[i], sk = s[i], series = tint[0], level = tint[ROWS] + tint[ROWS + 1] * ck + tint[ROWS + 2] * sk;
+        float ck = c[i], sk = s[i], series = tint.series[0];
+        float level = tint.luma * luma[i] + tint.level[0] + tint.level[1] * ck + tint.level[2] * sk;
 #pragma GCC unroll 3
         for (int k = 1; k <= harmonics; k++) {
-            series += tint[2 * k - 1] * ck + tint[2 * k] * sk;
+            series += tint.series[2 * k - 1] * ck + tint.series[2 * k] * sk;
             float next = ck * c[i] - sk * s[i];
             sk = sk * c[i] + ck * s[i];
             ck = next;
         }
-        places[i] = place_of(luma[i] * series + level, last);
+        places[i] = place_of(limited[i] * series + level, last);
     }
 }
 
 /* The same of what three planes hold at full resolution. */
-INLINE void mix_pixels(int total, const double *matrix, float last, const float *restrict first,
-                              const float *restrict second, const float *restrict third, int32_t *restrict places)
+INLINE void mix_pixels(int total, const double *matrix, int32_t last, const float *restrict first,
+                       const float *restrict second, const float *restrict third, int32_t *restrict places)
 {
-    float by_first = (float)matrix[0], by_second = (float)matrix[1], by_third = (float)matrix[2];
+    float by_first = (float)(matrix[0] * last), by_second = (float)(matrix[1] * last);
+    float by_third = (float)(matrix[2] * last);
     int steps = (total + STEP - 1) & -STEP;
     for (int i = 0; i < steps; i++)
         places[i] = place_of(by_first * first[i] + by_second * second[i] + by_third * third[i], last);
@@ -79,25 +83,33 @@ static HOT float mean_light(const Pixels *p, int64_t room, int channel)
     return p->total ? sum / (float)p->total : 0.0f;
 }
 
-/* Places in the decoding table of pixels' light. The lists of phase and codes are overwritten. */
-static HOT void find_places(const Blocks *b, int block, Pixels *p)
+/* Places in the decoding table of one channel's light. */
+static HOT int32_t find_places(const Blocks *b, int block, int channel, const Pixels *p)
 {
-    float last = (float)(b->entries - 1), *codes = p->light;
-    int harmonics = hue_harmonics(b->harmonics[block]), total = p->total;
-    turn_all(total, p->cosine, p->sine);
-    for (int c = 0; c < CHANNELS; c++) {
-        const float *tint = b->colour + (int64_t)block * COLOUR + c * TINT;
-        int32_t *places = b->places + c * b->room;
-        if (b->shift_x == 0 && b->shift_y == 0)
-            mix_pixels(total, b->rgb_from_ycc + 3 * c, last, codes, codes + b->room, codes + 2 * b->room, places);
-        else if (harmonics == 0)
-            colour_pixels(0, total, tint, last, codes, p->cosine, p->sine, places);
-        else if (harmonics == 2)
-            colour_pixels(2, total, tint, last, codes, p->cosine, p->sine, places);
-        else
-            colour_pixels(3, total, tint, last, codes, p->cosine, p->sine, places);
-        p->largest[c] = largest_place(total, places);
-    }
+    const Tint *tint = b->tints + block * CHANNELS + channel;
+    const float *c = p->cosine, *s = p->sine, *codes = list_of(b, CODE_LIST), *others = codes + b->room;
+    int32_t last = (int32_t)b->entries - 1, *places = b->places;
+    int harmonics = b->harmonics[block], total = p->total;
+    if (b->shift_x == 0 && b->shift_y == 0)
+        mix_pixels(total, b->rgb_from_ycc + 3 * channel, last, codes, others, others + b->room, places);
+    else if (harmonics == 0)
+        colour_pixels(0, total, tint, last, codes, others, c, s, places);
+    else if (harmonics == 1)
+        colour_pixels(1, total, tint, last, codes, others, c, s, places);
+    else if (harmonics == 2)
+        colour_pixels(2, total, tint, last, codes, others, c, s, places);
+    else
+        colour_pixels(3, total, tint, last, codes, others, c, s, places);
+    return largest_place(total, places);
+}
+
+/* Turns phases into cosines and sines, and limits the luma that chroma is scaled with. */
+static HOT void prepare_pixels(const Blocks *b, int block, const Pixels *p)
+{
+    float *luma = list_of(b, CODE_LIST);
+    turn_all(p->total, p->cosine, p->sine);
+    if (b->shift_x > 0 || b->shift_y > 0)
+        limit_luma(b->harmonics[block], p->total, limit_of(b, block), luma, p->cosine, p->sine, luma + b->room);
 }
 
 /* Lists the pixels of a block and their light. */
@@ -106,16 +118,16 @@ static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
     Span span = span_of(b, block, grid);
     if (span.total > b->limit)
         thin_out(b, &span, (int)b->limit);
-    list_points(b, block, grid, &span);
-    Pixels p = {span.total, {0}, list_of(b, PHASE_LIST), list_of(b, LISTS), list_of(b, X_LIST), list_of(b, Y_LIST),
-                list_of(b, CODE_LIST)};
-    int planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : 3;
-    for (int plane = 0; plane < planes; plane++)
-        list_codes(b, plane, &span, p.light + plane * b->room);
-    find_places(b, block, &p);
-    for (int c = 0; c < CHANNELS; c++)
-        look_up(b->light, p.total, b->places + c * b->room, p.light + c * b->room);
-    for (int k = 0; k <= LISTS; k++)
+    list_points(b, block, grid, &span, b->shift_x > 0 || b->shift_y > 0 ? LUMA : ALL_PLANES);
+    Pixels p = {span.total, {0}, list_of(b, PHASE_LIST), list_of(b, SINE_LIST), list_of(b, X_LIST),
+                list_of(b, Y_LIST), list_of(b, LIGHT_LIST)};
+    prepare_pixels(b, block, &p);
+    for (int c = 0; c < CHANNELS; c++) {
+        p.largest[c] = find_places(b, block, c, &p);
+        look_up(b->light, p.total, b->places, p.light + c * b->room);
+        clear_rest(p.light + c * b->room, p.total);
+    }
+    for (int k = PHASE_LIST; k <= SINE_LIST; k++)
         clear_rest(list_of(b, k), p.total);
     return p;
 }

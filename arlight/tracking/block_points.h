@@ -2,6 +2,8 @@
 #ifndef ARLIGHT_BLOCK_POINTS_H
 #define ARLIGHT_BLOCK_POINTS_H
 
+#include <string.h>
+
 #include "blocks.h"
 
 /* Pixels, or cells of pixels that share their chroma. */
@@ -20,7 +22,7 @@ typedef struct {
 } Span;
 
 /* Lists of pixels. */
-enum { PHASE_LIST, X_LIST, Y_LIST, CODE_LIST, LISTS = CODE_LIST + CHANNELS };
+enum { PHASE_LIST, X_LIST, Y_LIST, SINE_LIST, CODE_LIST, LIGHT_LIST = CODE_LIST + CHANNELS, LISTS = LIGHT_LIST + CHANNELS };
 
 INLINE float *list_of(const Blocks *b, int which)
 {
@@ -132,167 +134,195 @@ static HOT void thin_out(const Blocks *b, Span *span, int limit)
     span->sparse = 1;
 }
 
-/* Coefficients of the surfaces' cubics in each row. */
-static HOT void expand_rows(const Blocks *b, int block, const Grid *grid, const Span *span)
+/* Some neighbours in a list, and their columns. */
+typedef float Vector __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
+typedef int32_t Columns __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
+/* Pairs of codes side by side. */
+typedef uint16_t Pairs1 __attribute__((vector_size(2 * STEP), aligned(1), may_alias));
+typedef uint32_t Pairs2 __attribute__((vector_size(4 * STEP), aligned(1), may_alias));
+
+static const Columns EACH = {0, 1, 2, 3, 4, 5, 6, 7};
+
+/* What is read of a block's cells: luma, three planes, or chroma and the mean luma of the pixels that share it. */
+enum { LUMA, ALL_PLANES, CELLS };
+
+/* Where cells are read from and listed. */
+typedef struct {
+    const char *from[CHANNELS]; /* planes */
+    int64_t stride[CHANNELS];   /* bytes from row to row of the grid */
+    int64_t luma_stride;        /* bytes from row to row of pixels */
+    int bytes, across, down;    /* of a code; pixels that share chroma */
+    int last;                   /* column */
+    float left, step;           /* u of the first column, and from one to the next */
+    float *phase, *x, *y, *luma; /* luma: the sum over a cell */
+    char *codes[CHANNELS];
+} Reader;
+
+/* One row of cells. */
+typedef struct {
+    int row, left, count; /* in the plane */
+    int at;               /* place in the lists */
+    const float *terms;   /* (SURFACES, CUBIC) coefficients of u^k */
+} Row;
+
+/* Phase, x and y at some columns; their cubic part matters for the phase alone. */
+INLINE void place(const Reader *s, const float *k, Vector u, int at)
 {
-    int64_t n = b->blocks;
-    float scale = 1.0f / b->box[3 * n + block];
-    float top = ((float)span->first_row * grid->step_y + grid->first_y - b->box[n + block]) * scale;
-    float down = grid->step_y * scale;
-    for (int k = 0; k < SURFACES * CUBIC; k++) {
-        const float *of = b->surfaces + k * CUBIC * n + block;
-        float c0 = of[0], c1 = of[n], c2 = of[2 * n], c3 = of[3 * n], *out = b->rows + k * b->height;
-        for (int r = 0; r < span->rows; r++) {
-            float v = top + down * (float)r;
-            out[r] = c0 + v * (c1 + v * (c2 + v * c3));
+    *(Vector *)(s->phase + at) = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
+    *(Vector *)(s->x + at) = k[4] + u * (k[5] + u * k[6]);
+    *(Vector *)(s->y + at) = k[8] + u * (k[9] + u * k[10]);
+}
+
+/* Sums of neighbouring pairs of codes. */
+INLINE Columns sum_pairs(const char *from, int bytes)
+{
+    if (bytes == 1) {
+        Pairs1 pairs = *(const Pairs1 *)from;
+        return __builtin_convertvector((pairs & 255) + (pairs >> 8), Columns);
+    }
+    Pairs2 pairs = *(const Pairs2 *)from;
+    return (Columns)((pairs & 65535) + (pairs >> 16));
+}
+
+/* A row of neighbours, in whole steps: what is too much is written over by the next row. */
+INLINE void list_neighbours(const Reader *s, Row row, int what, int bytes, int down)
+{
+    const char *from[CHANNELS];
+    for (int plane = 0; plane < CHANNELS; plane++)
+        from[plane] = s->from[plane] + row.row * s->stride[plane] + row.left * bytes;
+    const char *pairs = from[0] + row.left * bytes;
+    Vector u = s->left + s->step * __builtin_convertvector(row.left + EACH, Vector);
+    for (int i = 0; i < row.count; i += STEP, u += s->step * STEP) {
+        place(s, row.terms, u, row.at + i);
+        for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+            memcpy(s->codes[plane] + (row.at + i) * bytes, from[plane] + i * bytes, (size_t)(STEP * bytes));
+        if (what == CELLS) {
+            Columns sum = sum_pairs(pairs + 2 * i * bytes, bytes);
+            if (down == 2)
+                sum += sum_pairs(pairs + 2 * i * bytes + s->luma_stride, bytes);
+            *(Vector *)(s->luma + row.at + i) = __builtin_convertvector(sum, Vector);
         }
     }
 }
 
-/* A row's phase, x and y; k: its cubics; u: of its first cell, or of column 0 where columns are given. */
-INLINE void place_row(const float k[SURFACES * CUBIC], float u, float across, const int32_t *restrict columns,
-                             int count, float *restrict phase, float *restrict x, float *restrict y)
+INLINE int code_at(const char *row, int bytes, int64_t column)
 {
-    int steps = (count + STEP - 1) & -STEP;
-    for (int i = 0; i < steps; i++) {
-        float at = u + across * (columns ? (float)columns[i] : (float)i);
-        phase[i] = k[0] + at * (k[1] + at * (k[2] + at * k[3]));
-        x[i] = k[4] + at * (k[5] + at * (k[6] + at * k[7]));
-        y[i] = k[8] + at * (k[9] + at * (k[10] + at * k[11]));
+    return bytes == 1 ? ((const uint8_t *)row)[column] : ((const uint16_t *)row)[column];
+}
+
+/* A row of any cells, one by one; columns: NULL for neighbours. */
+static void list_scattered(const Reader *s, Row row, const int32_t *columns, int what)
+{
+    const float *k = row.terms;
+    for (int i = 0; i < row.count; i++) {
+        int column = columns ? columns[i] : row.left + i, at = row.at + i, sum = 0;
+        column = column < s->last ? column : s->last;
+        float u = s->left + s->step * (float)column;
+        s->phase[at] = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
+        s->x[at] = k[4] + u * (k[5] + u * k[6]);
+        s->y[at] = k[8] + u * (k[9] + u * k[10]);
+        for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+            memcpy(s->codes[plane] + at * s->bytes, s->from[plane] + row.row * s->stride[plane] + column * s->bytes,
+                   (size_t)s->bytes);
+        for (int j = 0; j < s->down && what == CELLS; j++)
+            for (int l = 0; l < s->across; l++)
+                sum += code_at(s->from[0] + row.row * s->stride[0] + j * s->luma_stride, s->bytes,
+                               (int64_t)column * s->across + l);
+        s->luma[at] = (float)sum;
     }
 }
 
-/* Fills the lists of phase, x and y. */
-static HOT void list_points(const Blocks *b, int block, const Grid *grid, const Span *span)
+/* A row of neighbours; the usual ones have loops of their own. */
+INLINE void list_row(const Reader *s, Row row, int what)
+{
+    if (what == CELLS && s->bytes == 1)
+        list_neighbours(s, row, CELLS, 1, s->down);
+    else if (what == LUMA && s->bytes == 1)
+        list_neighbours(s, row, LUMA, 1, 1);
+    else
+        list_neighbours(s, row, what, s->bytes, s->down);
+}
+
+static Reader reader_of(const Blocks *b, int block, int what, const Grid *grid)
+{
+    int cells = what == CELLS;
+    float scale = 1.0f / b->box[2 * b->blocks + block];
+    Reader s = {.luma_stride = b->stride[0], .bytes = (int)b->bytes, .across = cells ? (int)grid->step_x : 1,
+                .down = cells ? (int)grid->step_y : 1, .last = grid->width - 1,
+                .left = (grid->first_x - b->box[block]) * scale, .step = grid->step_x * scale,
+                .phase = list_of(b, PHASE_LIST), .x = list_of(b, X_LIST), .y = list_of(b, Y_LIST),
+                .luma = list_of(b, LIGHT_LIST)};
+    for (int plane = 0; plane < CHANNELS; plane++) {
+        s.from[plane] = b->planes[plane];
+        s.stride[plane] = b->stride[plane] * (plane == 0 ? s.down : 1);
+        s.codes[plane] = b->codes + plane * b->room * s.bytes;
+    }
+    return s;
+}
+
+/* Coefficients of the surfaces' cubics in each row. They are read long after they are written, as is fast. */
+INLINE void expand_rows(const Blocks *b, int block, const Grid *grid, const Span *span)
+{
+    typedef float Terms __attribute__((vector_size(4 * TERMS), aligned(4), may_alias));
+    const Terms *of = (const Terms *)(b->surfaces + (int64_t)block * CUBIC * TERMS);
+    Terms *rows = (Terms *)b->rows;
+    float scale = 1.0f / b->box[3 * b->blocks + block], middle = b->box[b->blocks + block];
+    for (int r = 0; r < span->rows; r++) {
+        float v = ((float)(span->first_row + r) * grid->step_y + grid->first_y - middle) * scale;
+        rows[r] = of[0] + v * (of[1] + v * (of[2] + v * of[3]));
+    }
+}
+
+/* Fills the lists of phase, x, y and of the planes' codes, for CELLS also that of their luma's sums. */
+static HOT void list_cells(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
 {
     expand_rows(b, block, grid, span);
-    float scale = 1.0f / b->box[2 * b->blocks + block], across = grid->step_x * scale;
-    float left = (grid->first_x - b->box[block]) * scale;
-    float *phase = list_of(b, PHASE_LIST), *x = list_of(b, X_LIST), *y = list_of(b, Y_LIST);
-    const int32_t *columns = b->places;
-    for (int r = 0; r < span->rows; r++) {
-        float k[SURFACES * CUBIC];
-        for (int i = 0; i < SURFACES * CUBIC; i++)
-            k[i] = b->rows[i * b->height + r];
-        int count = span->count[r];
-        if (span->sparse)
-            place_row(k, left, across, columns, count, phase, x, y);
+    Reader s = reader_of(b, block, what, grid);
+    const int32_t *columns = span->sparse ? b->places : NULL;
+    int together = !columns && grid->width >= 2 * STEP && (what != CELLS || (s.across == 2 && s.down <= 2));
+    for (int r = 0, at = 0; r < span->rows; at += span->count[r++]) {
+        Row row = {span->first_row + r, span->left[r], span->count[r], at, b->rows + r * TERMS};
+        /* whole steps may run into the next row of the plane, not beyond the last */
+        if (together && (row.row + 1 < grid->height || row.left + whole_steps(row.count) <= grid->width))
+            list_row(&s, row, what);
         else
-            place_row(k, left + across * (float)span->left[r], across, NULL, count, phase, x, y);
-        phase += count, x += count, y += count, columns += count;
+            list_scattered(&s, row, columns ? columns + at : NULL, what);
     }
 }
 
-INLINE float code_at(const char *row, int bytes, int64_t column)
+/* A list of codes as values. */
+INLINE void convert(int total, const void *codes, int bytes, float offset, float scale, float *restrict values)
 {
-    return bytes == 1 ? (float)((const uint8_t *)row)[column] : (float)((const uint16_t *)row)[column];
+    int steps = (total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++)
+        values[i] = scale * (float)(bytes == 1 ? ((const uint8_t *)codes)[i] : ((const uint16_t *)codes)[i]) - offset;
 }
 
-/* A row's values of a plane. end: of the plane; what lies before it is read in whole steps, and written over by the
- * next row where it is too much. */
-INLINE void read_row(const char *row, int bytes, int left, const int32_t *restrict columns, int count,
-                            const char *end, float offset, float scale, float *restrict out)
-{
-    const char *from = row + (int64_t)left * bytes;
-    if (columns)
-        for (int i = 0; i < count; i++)
-            out[i] = scale * code_at(row, bytes, columns[i]) - offset;
-    else if (from + (int64_t)whole_steps(count) * bytes <= end) {
-        int steps = (count + STEP - 1) & -STEP;
-        for (int i = 0; i < steps; i++)
-            out[i] = scale * code_at(from, bytes, i) - offset;
-    } else
-        for (int i = 0; i < count; i++)
-            out[i] = scale * code_at(from, bytes, i) - offset;
-}
-
-INLINE void read_plane(const Blocks *b, int plane, int bytes, const Span *span, float *out)
+/* Converts the codes of one plane. */
+static HOT void convert_codes(const Blocks *b, int plane, int total, float *values)
 {
     float scale = (float)b->scale[plane], offset = (float)(b->offset[plane] * b->scale[plane]);
-    int64_t wide = plane ? (b->width + (1 << b->shift_x) - 1) >> b->shift_x : b->width;
-    int64_t high = plane ? (b->height + (1 << b->shift_y) - 1) >> b->shift_y : b->height;
-    const char *end = b->planes[plane] + (high - 1) * b->stride[plane] + wide * bytes;
-    const char *row = b->planes[plane] + span->first_row * b->stride[plane];
-    const int32_t *columns = b->places;
-    for (int r = 0; r < span->rows; r++, row += b->stride[plane]) {
-        int count = span->count[r];
-        read_row(row, bytes, span->left[r], span->sparse ? columns : NULL, count, end, offset, scale, out);
-        out += count, columns += count;
-    }
-}
-
-/* Fills a list with a plane's values at the cells; the plane has the grid's resolution. */
-static HOT void list_codes(const Blocks *b, int plane, const Span *span, float *out)
-{
+    const char *codes = b->codes + plane * b->room * b->bytes;
     if (b->bytes == 1)
-        read_plane(b, plane, 1, span, out);
+        convert(total, codes, 1, offset, scale, values);
     else
-        read_plane(b, plane, 2, span, out);
+        convert(total, codes, 2, offset, scale, values);
 }
 
-/* Two codes side by side. */
-typedef uint16_t Pair1 __attribute__((aligned(1), may_alias));
-typedef uint32_t Pair2 __attribute__((aligned(2), may_alias));
-
-/* Sum of the codes of a cell's part in one row; across: 1, 2 or 4 pixels. */
-INLINE int sum_across(const char *row, int bytes, int across, int64_t cell)
+/* Lists the cells of a block and the planes' values; for CELLS Cb and Cr, and their mean luma in the list of light. */
+static HOT void list_points(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
 {
-    if (across == 1)
-        return bytes == 1 ? ((const uint8_t *)row)[cell] : ((const uint16_t *)row)[cell];
-    int sum = 0;
-    for (int k = 0; k < across / 2; k++) {
-        int64_t at = across / 2 * cell + k;
-        if (bytes == 1)
-            sum += (((const Pair1 *)row)[at] & 255) + (((const Pair1 *)row)[at] >> 8);
-        else
-            sum += (int)(((const Pair2 *)row)[at] & 65535) + (int)(((const Pair2 *)row)[at] >> 16);
-    }
-    return sum;
-}
-
-/* A row's mean luma over cells of pixels. */
-INLINE void average_row(const char *row, int64_t stride, int bytes, int across, int down,
-                               const int32_t *restrict columns, int count, float offset, float scale,
-                               float *restrict out)
-{
-    for (int i = 0; i < count; i++) {
-        int64_t cell = columns ? columns[i] : i;
-        int sum = sum_across(row, bytes, across, cell);
-        for (int j = 1; j < down; j++)
-            sum += sum_across(row + j * stride, bytes, across, cell);
-        out[i] = scale * (float)sum - offset;
-    }
-}
-
-INLINE void average_plane(const Blocks *b, int bytes, int across, int down, const Span *span, float *out)
-{
-    float scale = (float)b->scale[0] / (float)(across * down), offset = (float)(b->offset[0] * b->scale[0]);
-    int64_t stride = b->stride[0];
-    const char *row = b->planes[0] + (int64_t)span->first_row * down * stride;
-    const int32_t *columns = b->places;
-    for (int r = 0; r < span->rows; r++, row += down * stride) {
-        int count = span->count[r];
-        const char *from = row + (int64_t)span->left[r] * across * bytes;
-        if (span->sparse)
-            average_row(row, stride, bytes, across, down, columns, count, offset, scale, out);
-        else
-            average_row(from, stride, bytes, across, down, NULL, count, offset, scale, out);
-        out += count, columns += count;
-    }
-}
-
-/* Fills a list with the mean luma of cells. The usual ones have loops of their own. */
-static HOT void list_mean_luma(const Blocks *b, const Span *span, float *out)
-{
-    int across = 1 << b->shift_x, down = 1 << b->shift_y;
-    if (b->bytes == 1 && across == 2 && down == 2)
-        average_plane(b, 1, 2, 2, span, out);
-    else if (b->bytes == 1)
-        average_plane(b, 1, across, down, span, out);
-    else if (across == 2 && down == 2)
-        average_plane(b, 2, 2, 2, span, out);
-    else
-        average_plane(b, 2, across, down, span, out);
+    list_cells(b, block, grid, span, what);
+    float *values = list_of(b, CODE_LIST);
+    for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+        convert_codes(b, plane, span->total, values + (plane - (what == CELLS)) * b->room);
+    if (what != CELLS)
+        return;
+    float *luma = list_of(b, LIGHT_LIST), scale = (float)b->scale[0] / (grid->step_x * grid->step_y);
+    float offset = (float)(b->offset[0] * b->scale[0]);
+    int steps = whole_steps(span->total) & -STEP;
+    for (int i = 0; i < steps; i++)
+        luma[i] = luma[i] * scale - offset;
 }
 
 /* Clears what stands behind the list up to a whole step. */

@@ -94,40 +94,58 @@ static HOT void sum_block(int harmonics, int total, const float *c, const float 
         sum_all(3, total, c, s, x, y, values, room, sums);
 }
 
-/* One fit's normal equations: columns 1, cos 1, sin 1, ..., x, y. Products of waves are sums of two others. */
-static void fill_fit(SmallFits *f, int l, int harmonics, const Sums *sums)
+/* One of the sums of some blocks; fits that are too many repeat the first. field: as in the first block's sums. */
+INLINE Fits gather_sums(const Sums *sums, int some, const float *field)
 {
-    int waves = 2 * harmonics + 1, count = waves + 2;
-    const float *c = sums->cosine, *s = sums->sine;
-    f->columns = count;
-    f->normal[0][0][l] = c[0];
+    Fits out;
+    int64_t offset = field - (const float *)sums;
+    for (int l = 0; l < FITS; l++)
+        out[l] = ((const float *)(sums + (l < some ? l : 0)))[offset];
+    return out;
+}
+
+/* Normal equations of some blocks' sums: columns 1, cos 1, sin 1, ..., x, y where there is shading. Products of waves
+ * are sums of two others. */
+static HOT void fill_fits(SmallFits *f, const Sums *sums, int some, int harmonics, int shading)
+{
+    int waves = 2 * harmonics + 1;
+    Fits c[2 * HARMONICS + 1] = {gather_sums(sums, some, sums->cosine)}, s[2 * HARMONICS + 1] = {0.0 * c[0]};
+    Fits(*normal)[COLUMNS] = f->normal;
+    f->columns = waves + (shading ? 2 : 0);
+    for (int k = 1; k <= 2 * harmonics; k++) {
+        c[k] = gather_sums(sums, some, sums->cosine + k);
+        s[k] = gather_sums(sums, some, sums->sine + k);
+    }
+    normal[0][0] = c[0];
     for (int i = 1; i <= harmonics; i++) {
-        f->normal[2 * i - 1][0][l] = c[i];
-        f->normal[2 * i][0][l] = s[i];
+        normal[2 * i - 1][0] = c[i];
+        normal[2 * i][0] = s[i];
         for (int j = 1; j <= i; j++) {
-            f->normal[2 * i - 1][2 * j - 1][l] = 0.5 * (c[i - j] + c[i + j]);
-            f->normal[2 * i][2 * j][l] = 0.5 * (c[i - j] - c[i + j]);
-            f->normal[2 * i][2 * j - 1][l] = 0.5 * (s[i + j] + s[i - j]);
+            normal[2 * i - 1][2 * j - 1] = 0.5 * (c[i - j] + c[i + j]);
+            normal[2 * i][2 * j] = 0.5 * (c[i - j] - c[i + j]);
+            normal[2 * i][2 * j - 1] = 0.5 * (s[i + j] + s[i - j]);
             if (j < i)
-                f->normal[2 * i - 1][2 * j][l] = 0.5 * (s[i + j] - s[i - j]);
+                normal[2 * i - 1][2 * j] = 0.5 * (s[i + j] - s[i - j]);
         }
     }
-    for (int k = 0; k <= harmonics; k++) {
-        f->normal[waves][k ? 2 * k - 1 : 0][l] = sums->x_cosine[k];
-        f->normal[waves + 1][k ? 2 * k - 1 : 0][l] = sums->y_cosine[k];
+    for (int k = 0; k <= harmonics && shading; k++) {
+        normal[waves][k ? 2 * k - 1 : 0] = gather_sums(sums, some, sums->x_cosine + k);
+        normal[waves + 1][k ? 2 * k - 1 : 0] = gather_sums(sums, some, sums->y_cosine + k);
         if (k) {
-            f->normal[waves][2 * k][l] = sums->x_sine[k];
-            f->normal[waves + 1][2 * k][l] = sums->y_sine[k];
+            normal[waves][2 * k] = gather_sums(sums, some, sums->x_sine + k);
+            normal[waves + 1][2 * k] = gather_sums(sums, some, sums->y_sine + k);
         }
     }
-    f->normal[waves][waves][l] = sums->xx;
-    f->normal[waves + 1][waves][l] = sums->xy;
-    f->normal[waves + 1][waves + 1][l] = sums->yy;
+    if (shading) {
+        normal[waves][waves] = gather_sums(sums, some, &sums->xx);
+        normal[waves + 1][waves] = gather_sums(sums, some, &sums->xy);
+        normal[waves + 1][waves + 1] = gather_sums(sums, some, &sums->yy);
+    }
     for (int k = 0; k < f->rights; k++) {
         for (int i = 0; i < waves; i++)
-            f->right[k][i][l] = sums->right[k][i];
-        f->right[k][waves][l] = sums->right[k][ROWS];
-        f->right[k][waves + 1][l] = sums->right[k][ROWS + 1];
+            f->right[k][i] = gather_sums(sums, some, sums->right[k] + i);
+        for (int i = 0; i < 2 && shading; i++)
+            f->right[k][waves + i] = gather_sums(sums, some, sums->right[k] + ROWS + i);
     }
 }
 

@@ -245,21 +245,25 @@ INLINE void meet_sheet(const Blocks *b, const Eye *eye, int first, Lane *x, Lane
 static HOT void expand_surfaces(const Blocks *b, const Eye *from, int first)
 {
     const Eye eye = *from;
-    int64_t n = b->blocks;
     Lane at[SURFACES][NODES], by_row[CUBIC];
     cast_rays(b, &eye, first, at[X], at[Y]);
     meet_sheet(b, &eye, first, at[X], at[Y], at[PHASE]);
     for (int surface = 0; surface < SURFACES; surface++)
         for (int power = 0; power < CUBIC; power++) {
             const float *of = OF_NODES[power];
-            float *out = b->surfaces + (surface * CUBIC + power) * CUBIC * n + first;
+            float *out = b->surfaces + (int64_t)first * CUBIC * TERMS + surface * CUBIC + power;
             for (int row = 0; row < CUBIC; row++) {
                 const Lane *node = at[surface] + row * CUBIC;
-                EACH_LANE by_row[row][l] = of[0] * node[0][l] + of[1] * node[1][l] + of[2] * node[2][l] + of[3] * node[3][l];
+                EACH_LANE by_row[row][l] =
+                    of[0] * node[0][l] + of[1] * node[1][l] + of[2] * node[2][l] + of[3] * node[3][l];
             }
-            for (int k = 0; k < CUBIC; k++)
-                EACH_LANE out[k * n + l] = OF_NODES[k][0] * by_row[0][l] + OF_NODES[k][1] * by_row[1][l] +
-                                           OF_NODES[k][2] * by_row[2][l] + OF_NODES[k][3] * by_row[3][l];
+            for (int k = 0; k < CUBIC; k++) {
+                Lane term;
+                of = OF_NODES[k];
+                EACH_LANE term[l] =
+                    of[0] * by_row[0][l] + of[1] * by_row[1][l] + of[2] * by_row[2][l] + of[3] * by_row[3][l];
+                EACH_LANE out[(l * CUBIC + k) * TERMS] = term[l];
+            }
         }
 }
 

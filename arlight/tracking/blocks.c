@@ -28,26 +28,19 @@ static int put_in_order(const Blocks *b, int *whites)
 }
 
 /* Reads the cells of all blocks; chroma: by place in the order. */
-static void read_chroma(const Blocks *b, int count, Chroma *chroma)
+static void read_chroma(const Blocks *b, int count, int limited, Chroma *chroma)
 {
     Grid grid = grid_of(b, 1);
-    for (int at = 0; at < count; at++) {
-        double mean[3];
-        float darkest;
-        sum_cells(b, b->order[at], &grid, b->sums + at, mean, &darkest);
-        memcpy(b->mean_code + 3 * b->order[at], mean, sizeof mean);
-        b->gathered[b->order[at]] = (int32_t)b->sums[at].cosine[0];
-        chroma[at].mean_luma = mean[0];
-        chroma[at].darkest = darkest;
-    }
+    for (int at = 0; at < count; at++)
+        sum_cells(b, b->order[at], &grid, limited, b->sums + at, chroma + at);
 }
 
 /* Brings shared chroma to every pixel: coefficients of each block's colour. */
 static void infer_colour(const Blocks *b, int count)
 {
     Chroma chroma[count ? count : 1];
-    read_chroma(b, count, chroma);
     predict_hues(b, count);
+    read_chroma(b, count, 1, chroma);
     for (int at = 0, some; at < count; at += some) {
         some = alike(b, at, count);
         fit_cells(b, b->order + at, some, b->sums + at, chroma + at);
@@ -56,7 +49,7 @@ static void infer_colour(const Blocks *b, int count)
     for (int at = 0; at < count; at++) {
         double correction[2][3];
         b->trust[b->order[at]] = correct(&stream, chroma + at, correction);
-        mix_colour(b, b->order[at], chroma + at, correction);
+        mix_tints(b, b->order[at], chroma + at, correction);
     }
 }
 
@@ -83,6 +76,32 @@ static float white_level(const float (*mean)[CHANNELS], int whites, int channel)
     return count == 0 ? 0.0f : values[below] + (at - (float)below) * (values[below + (below + 1 < count)] - values[below]);
 }
 
+/* sin x / x, for x below about 1. */
+static double sine_over(double x)
+{
+    double square = x * x;
+    return 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0));
+}
+
+/* Mean of exp(-i b) and of the view's cosine over the pixels: the window's expansion, and the pixels' moments. */
+static void average_look(const Blocks *b, int block, const Sums *sums)
+{
+    int64_t n = b->blocks;
+    double over = 1.0 / sums->cosine[0], x = sums->x_cosine[0] * over, y = sums->y_cosine[0] * over;
+    double xx = sums->xx * over, yy = sums->yy * over, xy = sums->xy * over, mean[2];
+    for (int q = 0; q < 2; q++) {
+        const float *a = b->look + q * 5 * n + block;
+        mean[q] = a[0] + a[n] * x + a[2 * n] * y + a[3 * n] * xx + a[4 * n] * yy;
+    }
+    double by_x = b->look[n + block], by_y = b->look[2 * n + block];
+    double along_x = by_x * sqrt(3.0 * fmax(xx - x * x, 0.0)), along_y = by_y * sqrt(3.0 * fmax(yy - y * y, 0.0));
+    double left = sine_over(along_x) * sine_over(along_y);
+    left -= by_x * by_y * (xy - x * y);
+    b->phasor[2 * block] = left * cos(mean[0]);
+    b->phasor[2 * block + 1] = -left * sin(mean[0]);
+    b->cosine[block] = mean[1];
+}
+
 /* Lists a block's pixels without those that show a lamp. level: of white, 0 where it is not known; mean: of all the
  * pixels, where it is asked for. */
 static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const float level[CHANNELS], float *mean)
@@ -102,8 +121,12 @@ static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const flo
         ceiling[c] = known && lifted < (float)b->clip ? lifted : (float)b->clip;
         over |= largest > ceiling[c];
     }
-    if (over)
+    if (over) {
+        Sums all;
+        sum_block(0, p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, &all);
+        average_look(b, block, &all);
         leave_out(&p, b->room, ceiling);
+    }
     return p;
 }
 
@@ -122,6 +145,8 @@ static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANN
         int white = at < whites && known < MOST_WHITES;
         Pixels p = usable_pixels(b, at, &grid, level, white ? mean[known] : NULL);
         sum_block(b->harmonics[b->order[at]], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, b->sums + at);
+        if (p.total > 0 && p.total == b->gathered[b->order[at]])
+            average_look(b, b->order[at], b->sums + at);
         known += white && b->gathered[b->order[at]] >= LEAST_SAMPLES;
     }
 }
@@ -162,53 +187,86 @@ static void fit_blocks(const Blocks *b, int count)
         int used[FITS];
         float squares[FITS][CHANNELS];
         some = alike(b, at, count);
-        for (int l = 0; l < FITS; l++) {
-            const Sums *sums = b->sums + at + (l < some ? l : 0);
-            fill_fit(&fits, l, b->harmonics[b->order[at]], sums);
-            used[l] = (int)sums->cosine[0];
-            memcpy(squares[l], sums->squares, sizeof squares[l]);
+        fill_fits(&fits, b->sums + at, some, b->harmonics[b->order[at]], 1);
+        for (int l = 0; l < some; l++) {
+            used[l] = (int)b->sums[at + l].cosine[0];
+            memcpy(squares[l], b->sums[at + l].squares, sizeof squares[l]);
         }
         solve_fits(&fits);
         keep_fits(b, &fits, b->order + at, some, used, (const float(*)[CHANNELS])squares);
     }
 }
 
-/* Cubic shading: the columns' products, of one fit. The place's monomials come after the waves. */
-static HOT void fill_cubic(SmallFits *f, int l, int harmonics, Pixels *p, int64_t room, float *columns, float squares[CHANNELS])
+/* Lists of the columns of a fit with cubic shading: the waves, then the place's monomials, even ones less their mean
+ * over the window. Returns their number. */
+static HOT int list_columns(int harmonics, const Pixels *p, int64_t room, float *columns)
 {
-    int waves = 2 * harmonics + 1, count = waves + 9, steps = whole_steps(p->total);
-    f->columns = count;
+    const float *restrict c = p->cosine, *restrict s = p->sine, *restrict x = p->x, *restrict y = p->y;
+    int steps = whole_steps(p->total) & -STEP, count = 2 * harmonics + 1;
+    for (int i = 0; i < steps; i++)
+        columns[i] = i < p->total ? 1.0f : 0.0f;
+    for (int k = 1; k <= harmonics; k++) {
+        float *restrict cosine = columns + (2 * k - 1) * room, *restrict sine = cosine + room;
+        const float *restrict last_c = k > 1 ? cosine - 2 * room : columns, *restrict last_s = k > 1 ? sine - 2 * room : s;
+        for (int i = 0; i < steps; i++) {
+            cosine[i] = k > 1 ? last_c[i] * c[i] - last_s[i] * s[i] : c[i];
+            sine[i] = k > 1 ? last_s[i] * c[i] + last_c[i] * s[i] : s[i];
+        }
+    }
+    float *restrict out = columns + count * room;
     for (int i = 0; i < steps; i++) {
-        float x = p->x[i], y = p->y[i], there = i < p->total ? 1.0f : 0.0f, c = p->cosine[i], s = p->sine[i];
-        float *at = columns + i, ck = c, sk = s;
-        *at = there, at += room;
-        for (int k = 1; k <= harmonics; k++) {
-            *at = ck, at += room;
-            *at = sk, at += room;
-            float next = ck * c - sk * s;
-            sk = sk * c + ck * s;
-            ck = next;
-        }
-        float term[9] = {x, y, (x * x - 1.0f / 3.0f) * there, x * y, (y * y - 1.0f / 3.0f) * there, x * x * x, x * x * y, x * y * y, y * y * y};
-        for (int k = 0; k < 9; k++, at += room)
-            *at = term[k];
+        float u = x[i], v = y[i], third = columns[i] / 3.0f;
+        out[i] = u, out[room + i] = v;
+        out[2 * room + i] = u * u - third, out[3 * room + i] = u * v, out[4 * room + i] = v * v - third;
+        out[5 * room + i] = u * u * u, out[6 * room + i] = u * u * v;
+        out[7 * room + i] = u * v * v, out[8 * room + i] = v * v * v;
     }
-    for (int a = 0; a < count; a++) {
-        const float *left = columns + a * room;
-        for (int k = 0; k <= a + CHANNELS; k++) {
-            const float *right = k <= a ? columns + k * room : p->light + (k - a - 1) * room;
-            float sum = 0.0f;
-            for (int i = 0; i < steps; i++)
-                sum += left[i] * right[i];
-            *(k <= a ? &f->normal[a][k][l] : &f->right[k - a - 1][a][l]) = sum;
-        }
+    return count + 9;
+}
+
+/* Products of a list with four others, `room` apart. */
+INLINE void multiply(int total, const float *restrict a, const float *restrict b, int64_t room, float products[4])
+{
+    const float *restrict second = b + room, *restrict third = second + room, *restrict fourth = third + room;
+    float sums[4] = {0.0f};
+    int steps = (total + STEP - 1) & -STEP;
+    for (int i = 0; i < steps; i++) {
+        sums[0] += a[i] * b[i];
+        sums[1] += a[i] * second[i];
+        sums[2] += a[i] * third[i];
+        sums[3] += a[i] * fourth[i];
     }
-    for (int c = 0; c < CHANNELS; c++) {
-        const float *light = p->light + c * room;
-        float sum = 0.0f;
-        for (int i = 0; i < steps; i++)
-            sum += light[i] * light[i];
-        squares[c] = sum;
+    for (int k = 0; k < 4; k++)
+        products[k] = sums[k];
+}
+
+/* Products of the columns with each other and with the values, of one fit; lists: columns, then values. */
+static HOT void fill_cubic(SmallFits *f, int l, int total, int64_t room, const float *lists, float squares[CHANNELS])
+{
+    int columns = f->columns, all = columns + CHANNELS;
+    for (int i = 0; i < all; i++)
+        for (int j = i; j < all; j += 4) {
+            float products[4];
+            multiply(total, lists + i * room, lists + j * room, room, products);
+            for (int k = j; k < j + 4 && k < all; k++) {
+                if (k < columns)
+                    f->normal[k][i][l] = products[k - j];
+                else if (i < columns)
+                    f->right[k - columns][i][l] = products[k - j];
+                else if (k == i)
+                    squares[k - columns] = products[k - j];
+            }
+        }
+}
+
+/* Makes a fit the same as the first. */
+static void repeat_fit(SmallFits *f, int l)
+{
+    for (int i = 0; i < f->columns; i++) {
+        for (int j = 0; j <= i; j++)
+            f->normal[i][j][l] = f->normal[i][j][0];
+        for (int c = 0; c < f->rights; c++)
+            f->right[c][i][l] = f->right[c][i][0];
     }
 }
 
@@ -220,15 +278,18 @@ static void fit_lamps(const Blocks *b, const int32_t *order, int some, const flo
     Grid grid = grid_of(b, 0);
     int used[FITS];
     float squares[FITS][CHANNELS];
-    for (int l = 0; l < FITS; l++) {
-        int at = l < some ? l : 0;
-        Pixels p = usable_pixels(b, order[at], &grid, level, NULL);
-        fill_cubic(&fits, l, b->harmonics[b->order[order[at]]], &p, b->room, list_of(b, 12), squares[l]);
+    int32_t blocks[FITS];
+    for (int l = 0; l < some; l++) {
+        blocks[l] = b->order[order[l]];
+        Pixels p = usable_pixels(b, order[l], &grid, level, NULL);
+        float *lists = list_of(b, LISTS);
+        fits.columns = list_columns(b->harmonics[blocks[l]], &p, b->room, lists);
+        memcpy(lists + fits.columns * b->room, p.light, (size_t)(CHANNELS * b->room) * sizeof *lists);
+        fill_cubic(&fits, l, p.total, b->room, lists, squares[l]);
         used[l] = p.total;
     }
-    int32_t blocks[FITS];
-    for (int l = 0; l < some; l++)
-        blocks[l] = b->order[order[l]];
+    for (int l = some; l < FITS; l++)
+        repeat_fit(&fits, l);
     solve_fits(&fits);
     keep_fits(b, &fits, blocks, some, used, (const float(*)[CHANNELS])squares);
 }
@@ -262,25 +323,6 @@ static void treat_lamps(const Blocks *b, int count, const float level[CHANNELS],
             uneven[block * CHANNELS + c] += sqrt(b->variance[block * CHANNELS + c]);
         lamps[some++] = at;
     }
-}
-
-/* Mean of exp(-i b) and of the view's cosine over the pixels: the window's expansion, and the pixels' moments. */
-static void average_look(const Blocks *b, int block, const Sums *sums)
-{
-    int64_t n = b->blocks;
-    double over = 1.0 / sums->cosine[0], x = sums->x_cosine[0] * over, y = sums->y_cosine[0] * over;
-    double xx = sums->xx * over, yy = sums->yy * over, xy = sums->xy * over, mean[2];
-    for (int q = 0; q < 2; q++) {
-        const float *a = b->look + q * 5 * n + block;
-        mean[q] = a[0] + a[n] * x + a[2 * n] * y + a[3 * n] * xx + a[4 * n] * yy;
-    }
-    double by_x = b->look[n + block], by_y = b->look[2 * n + block];
-    double along_x = by_x * sqrt(3.0 * fmax(xx - x * x, 0.0)), along_y = by_y * sqrt(3.0 * fmax(yy - y * y, 0.0));
-    double left = (fabs(along_x) > 1e-4 ? sin(along_x) / along_x : 1.0) * (fabs(along_y) > 1e-4 ? sin(along_y) / along_y : 1.0);
-    left -= by_x * by_y * (xy - x * y);
-    b->phasor[2 * block] = left * cos(mean[0]);
-    b->phasor[2 * block + 1] = -left * sin(mean[0]);
-    b->cosine[block] = mean[1];
 }
 
 /* Everything in units of light without vignetting. */
@@ -324,7 +366,11 @@ EXPORT void survey_blocks(const Blocks *b)
     view_blocks(b);
     int count = put_in_order(b, &whites);
     Chroma chroma[count ? count : 1];
-    read_chroma(b, count, chroma);
+    read_chroma(b, count, 0, chroma);
+    for (int at = 0; at < count; at++) {
+        memcpy(b->mean_code + 3 * b->order[at], chroma[at].mean, sizeof chroma[at].mean);
+        b->gathered[b->order[at]] = (int32_t)b->sums[at].cosine[0];
+    }
 }
 
 EXPORT void measure_blocks(const Blocks *b)
@@ -338,9 +384,6 @@ EXPORT void measure_blocks(const Blocks *b)
     if (b->shift_x > 0 || b->shift_y > 0)
         infer_colour(b, count);
     sum_blocks(b, whites, count, level);
-    for (int at = 0; at < count; at++)
-        if (b->sums[at].cosine[0] > 0.0f)
-            average_look(b, b->order[at], b->sums + at);
     fit_blocks(b, count);
     treat_lamps(b, count, level, uneven);
     finish(b, uneven);

@@ -10,9 +10,14 @@
 enum { HARMONICS = 3, ROWS = 2 * HARMONICS + 1, CHANNELS = 3 };
 enum { PATTERNED = 1, WHITE = 2, WANTED = 4 };    /* flags of a block */
 enum { EDGES = 8, CUBIC = 4 };                    /* of the usable window; coefficients of a cubic */
-enum { PHASE, X, Y, SURFACES };                   /* the film pattern's phase [cycles], the place in the window */
-enum { HUE = ROWS + 1 };                          /* chroma over luma along the stripes, and a constant */
-enum { TINT = ROWS + 3, COLOUR = CHANNELS * TINT }; /* an encoded channel: luma times a series, plus a sinusoid */
+enum { PHASE, X, Y, SURFACES, TERMS = 16 };       /* the film pattern's phase [cycles], the place in the window */
+enum { HUES = 3, HUE = ROWS + 1 };                /* series along the stripes of chroma over luma, and a constant */
+
+/* One encoded channel of a block, in places of the decoding table: of luma, of limited luma along the stripes, and a
+ * constant, cos and sin. */
+typedef struct {
+    float luma, series[ROWS], level[3];
+} Tint;
 
 /* Sums over one block's pixels: what normal equations with harmonics and linear shading are made of. */
 typedef struct {
@@ -44,18 +49,19 @@ typedef struct {
     float *gain;        /* (n) vignetting in the block's middle */
     float *box;         /* (4, n) middle x, y and half the size x, y of the part in the picture [px] */
     float *edges;       /* (EDGES, 3, n) a, b, c: a x + b y <= c inside, from the box's middle [px] */
-    float *surfaces;    /* (SURFACES, CUBIC, CUBIC, n) coefficients of u^k v^l, u and v from -1 to 1 over the box */
+    float *surfaces;    /* (n, CUBIC, TERMS) coefficients by power of v: of u^k for each surface; -1 to 1 over the box */
     float *look;        /* (2, 5, n) the view's phase 2 pi f.D, and cosine: value, slopes, half second slopes */
 
     int64_t limit;         /* pixels a block at most */
     int64_t room;          /* floats of a list */
     int32_t *order;        /* (n) blocks to be measured: white ones first, then by harmonics */
     int32_t *spans;        /* (2, height) first pixel of a row, and how many */
-    float *rows;           /* (SURFACES * CUBIC, height) */
+    float *rows;           /* (height, TERMS) coefficients in each row; also limits (2, height) */
     int32_t *places;       /* (CHANNELS, room) */
-    float *lists;          /* (12, room) */
-    float *hue;            /* (2, HUE, n) of Cb and Cr */
-    float *colour;         /* (n, COLOUR) */
+    char *codes;           /* (CHANNELS, room) of 2 bytes at most */
+    float *lists;          /* (33, room) */
+    float *hue;            /* (n, HUES, HUE) of Cb and Cr; most luma that chroma is scaled with, and least over most */
+    Tint *tints;           /* (n, CHANNELS) */
     double *mean_code;     /* (n, 3) mean luma and chroma where chroma is shared */
     float *ceiling;        /* (n, CHANNELS) light beyond which a pixel is left out */
     Sums *sums;            /* (n) by place in the order */

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _MIN_SAMPLES = 24
 _EDGE_PX = 1.5
 _UNRESOLVED_BLUR_PX = 0.6
+_ANY_LUMA = 100.0
+"""More luma than there is: no pixel is brighter than stripes that are not known."""
 
 
 class BlockMeter:
@@ -71,8 +73,10 @@ class BlockMeter:
         luma, chroma = color_line(*self._reference_colors(frame, curve), curve, matrix)
         columns = np.stack([luma, np.ones_like(luma)], axis=1)
         slope, base = np.linalg.lstsq(columns, chroma, rcond=None)[0]
-        self._kernels.hue[:] = 0.0
-        self._kernels.hue[:, 0], self._kernels.hue[:, -1] = slope[:, None], base[:, None]
+        hue = self._kernels.hue
+        hue[:] = 0.0
+        hue[:, :2, 0], hue[:, :2, -1] = slope, base
+        hue[:, 2, 0], hue[:, 2, -1] = _ANY_LUMA, -1.0
 
     def _reference_colors(self, frame: Frame, curve: Decoding) -> tuple[Array, Array]:
         """Linear RGB of a black and of a white region, medians over the sheet."""
