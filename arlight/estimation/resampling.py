@@ -29,7 +29,9 @@ class Resampling:
     def apply(self, packed: Array, covariance: Array) -> tuple[Array, Array]:
         """Coefficients (..., m) at whole frequencies with their covariance (..., m, m)."""
         values = packed @ self.matrix.T
-        spread = self.matrix @ covariance @ self.matrix.T
+        # seven digits of a covariance are plenty; `missing` keeps it positive definite
+        matrix = self.matrix.astype(np.float32)
+        spread = matrix @ covariance.astype(np.float32) @ matrix.T
         return values, spread + self.missing * values[..., :1, None] ** 2
 
 
