@@ -5,7 +5,7 @@
 
 /* One block's rows (7, 3), with its stripes of one colour: those of red and blue are green's, scaled. What differs in
    shape comes from chroma, and expecting it again would let its errors feed themselves. */
-static void guide_block(const double *predicted, int64_t stride, const double *white, double *to)
+INLINE void guide_block(const double *predicted, int64_t stride, const double *white, double *to)
 {
     const double *green = predicted + GREEN * ROWS * stride;
     const double floor = FAINT_STRIPES * FAINT_STRIPES * white[GREEN] * white[GREEN];
@@ -23,7 +23,7 @@ static void guide_block(const double *predicted, int64_t stride, const double *w
 }
 
 /* Writes stripes (blocks, 7, 3) and reflection (blocks, 3) in the sheet's own order; blocks that were not used stay. */
-EXPORT void guide(const MeasuredBlocks *m, const double *predicted, const double *mirrored, double *stripes,
+EXPORT HOT void guide(const MeasuredBlocks *m, const double *predicted, const double *mirrored, double *stripes,
                   double *reflection)
 {
     for (int64_t j = 0; j < m->blocks; j++) {

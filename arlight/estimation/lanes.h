@@ -73,6 +73,21 @@ INLINE lanes exponential(lanes x)
     return sum * (lanes)((bits << 52) + ((int64_t)1023 << 52));
 }
 
+/* Natural logarithm to 1e-12, of normal positive numbers. */
+INLINE lanes logarithm(lanes x)
+{
+    /* x is a power of two times a mantissa between sqrt(1/2) and sqrt(2) */
+    const lane_bits bits = (lane_bits)x - (lane_bits)splat(0.70710678118654752440);
+    const lane_bits whole = bits >> 52;
+    const lanes mantissa = (lanes)((lane_bits)x - (whole << 52));
+    const lanes power = (lanes)(whole + (lane_bits)splat(6755399441055744.0)) - 6755399441055744.0;
+    const lanes z = (mantissa - 1.0) / (mantissa + 1.0), square = z * z;
+    lanes sum = splat(2.0 / 15.0);
+    for (int k = 13; k > 0; k -= 2)
+        sum = sum * square + 2.0 / k;
+    return power * 0.69314718055994530942 + z * sum;
+}
+
 /* sin(pi x) / x and cos(pi x) to 1e-13, for -0.5 to 0.5. */
 INLINE void half_turn(lanes x, lanes *sine_over, lanes *cosine)
 {

@@ -7,30 +7,50 @@
 #define PATTERN_TO_WHITE 8. /* how much brighter white is than the mean of a pattern, about */
 #define FIELD_FLOOR 1e-3    /* least standard deviation of the mirror reflection, relative to white */
 
-/* One block's numbers; zeros where it was not seen. */
-static void gather_block(const MeasuredBlocks *m, int64_t j)
+#define NOTHING_LEFT 1e-30  /* least share whose logarithm is taken */
+
+/* One block's rows and their covariance; zeros where nothing was seen. */
+INLINE void gather_rows(const MeasuredBlocks *m, int64_t j, int64_t i, int rows)
 {
-    int64_t n = m->stride, i = j < m->blocks ? m->sequence[j] : -1;
-    int seen = i >= 0 && m->valid[i], resolved = seen ? (int)m->harmonics[i] : 0;
+    const int64_t n = m->stride;
+    const double *values = m->values + i * ROWS * CHANNELS, *covariance = m->covariance + i * ROWS * ROWS;
+    double *measured = m->measured + j, *pixels = m->pixels + j;
+    for (int r = 0, pair = 0; r < ROWS; r++) {
+        for (int c = 0; c < CHANNELS; c++)
+            measured[(c * ROWS + r) * n] = r < rows ? values[r * CHANNELS + c] : 0.0;
+        for (int s = 0; s <= r; s++, pair++)
+            pixels[pair * n] = r < rows ? covariance[r * ROWS + s] : 0.0;
+    }
+}
+
+/* What else is known of a block; `seen` or not. */
+INLINE void gather_rest(const MeasuredBlocks *m, int64_t j, int64_t i, int seen)
+{
+    const int64_t n = m->stride;
     for (int c = 0; c < CHANNELS; c++) {
-        for (int r = 0; r < ROWS; r++)
-            m->measured[(c * ROWS + r) * n + j] =
-                seen && harmonic_of_row(r) <= resolved ? m->values[(i * ROWS + r) * CHANNELS + c] : 0.0;
         m->noise[c * n + j] = seen ? m->pixel_variance[i * CHANNELS + c] : 0.0;
         m->uneven[c * n + j] = seen ? m->shading[i * CHANNELS + c] : 0.0;
     }
-    for (int r = 0, pair = 0; r < ROWS; r++)
-        for (int s = 0; s <= r; s++, pair++)
-            m->pixels[pair * n + j] =
-                seen && harmonic_of_row(r) <= resolved ? m->covariance[(i * ROWS + r) * ROWS + s] : 0.0;
-    m->resolved[j] = resolved;
+    m->resolved[j] = seen ? (double)m->harmonics[i] : 0.0;
     m->seen[j] = seen;
-    m->trust[j] = i >= 0 ? m->color_trust[i] : 1.0;
-    m->phasor[j] = i >= 0 ? m->view_phasor[2 * i] : 1.0;
-    m->phasor[n + j] = i >= 0 ? m->view_phasor[2 * i + 1] : 0.0;
-    m->cosine[j] = i >= 0 ? m->view_cosine[i] : 1.0;
-    m->cycles[j] = i >= 0 ? m->cycles_per_px[2 * i] : 0.0;
-    m->cycles[n + j] = i >= 0 ? m->cycles_per_px[2 * i + 1] : 0.0;
+    m->trust[j] = m->color_trust[i];
+    m->phasor[j] = m->view_phasor[2 * i];
+    m->phasor[n + j] = m->view_phasor[2 * i + 1];
+    m->cosine[j] = m->view_cosine[i];
+    m->cycles[j] = m->cycles_per_px[2 * i];
+    m->cycles[n + j] = m->cycles_per_px[2 * i + 1];
+}
+
+/* All blocks; lanes beyond them repeat the last one, unseen. */
+static HOT void gather_blocks(const MeasuredBlocks *m)
+{
+    int64_t whole = (m->blocks + LANES - 1) / LANES * LANES;
+    for (int64_t j = 0; j < whole; j++) {
+        int64_t i = m->sequence[j < m->blocks ? j : m->blocks - 1];
+        int seen = j < m->blocks && m->valid[i];
+        gather_rows(m, j, i, seen ? 1 + 2 * (int)m->harmonics[i] : 0);
+        gather_rest(m, j, i, seen);
+    }
 }
 
 /* sin(pi f) / (pi f) and cos(pi f). */
@@ -53,9 +73,7 @@ static HOT void square_pixels(const MeasuredBlocks *m)
     for (int64_t j = 0; j < m->blocks; j += LANES) {
         lanes x, y, sinc_x = sinc(load(m->cycles + j), &x), sinc_y = sinc(load(m->cycles + n + j), &y);
         lanes first = sinc_x * sinc_y;
-        store(m->left + j, first);
-        store(m->left + n + j, first * x * y);
-        store(m->left + 2 * n + j, first * (4.0 * x * x - 1.0) * (4.0 * y * y - 1.0) / 9.0);
+        const lanes left[] = {first, first * x * y, first * (4.0 * x * x - 1.0) * (4.0 * y * y - 1.0) / 9.0};
         for (int h = 0; h < HARMONICS; h++) {
             lanes turn = splat(2.0 * PI * (h + 1)), fourth = splat(0.0);
             for (int axis = 0; axis < 2; axis++) {
@@ -64,6 +82,8 @@ static HOT void square_pixels(const MeasuredBlocks *m)
                 fourth += wave * wave * wave * wave;
             }
             store(m->fineness + h * n + j, fourth);
+            store(m->left + h * n + j, left[h]);
+            store(m->left_log + h * n + j, logarithm(larger(left[h], splat(NOTHING_LEFT))));
         }
     }
 }
@@ -114,12 +134,8 @@ static double quiet_variance(const MeasuredBlocks *m, int channel)
 /* Fills the planes and levels from what was measured. */
 EXPORT void gather(MeasuredBlocks *m)
 {
-    int64_t whole = (m->blocks + LANES - 1) / LANES * LANES;
-    for (int64_t j = 0; j < whole; j++)
-        gather_block(m, j);
+    gather_blocks(m);
     square_pixels(m);
-    for (int64_t j = 0; j < HARMONICS * m->stride; j++)
-        m->left_log[j] = m->left[j] > 0.0 ? log(m->left[j]) : -100.0;
     mirrored_share(m);
     m->whole = 1;
     for (int64_t j = 0; j < m->blocks; j++)

@@ -28,8 +28,8 @@ static double unexplained_share(const ChannelFit *f)
         if (m->resolved[i] < 1.0 || !(plane(f, TRANSFER)[i] > CLEAR_TRANSFER))
             continue;
         const double *x = m->measured + (c * ROWS + 1) * n + i, *p = f->predicted + (c * ROWS + 1) * n + i;
-        double missed = hypot(x[0] - p[0], x[n] - p[n]);
-        m->scratch[clear++] = missed / (hypot(x[0], x[n]) + FAINT * white_of(f));
+        double across = x[0] - p[0], along = x[n] - p[n], seen = sqrt(x[0] * x[0] + x[n] * x[n]);
+        m->scratch[clear++] = sqrt(across * across + along * along) / (seen + FAINT * white_of(f));
     }
     if (clear < FEWEST || (double)clear < SMALLEST_SHARE * (double)patterned)
         return NAN;
