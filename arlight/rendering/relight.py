@@ -22,12 +22,12 @@ from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.refinement import refined
 from arlight.rendering.settings import RelightSettings
-from arlight.rendering.shadow import dark_texels, irradiance_ratio
+from arlight.rendering.shadow import dark_texels, drop_faint, irradiance_ratio
 from arlight.rendering.transfer_cache import kept_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.frame import Frame, Region
 
-_DARKENING = 0.008
+_FAINT = 0.008
 """A shadow that takes less than this share of the light is below one 8-bit level, and pixels of less are left alone."""
 
 _TOLERANCE = 0.04
@@ -141,6 +141,7 @@ class Relighter:
         packed = self._packed(lighting)
         hidden, open_plane = self._plane_rows.light(packed)
         ratio = irradiance_ratio(hidden, open_plane[:, 0], self.transfer.shadow.grid.side)
+        drop_faint(ratio, _FAINT)
         view = self._view(camera_from_probe)
         region = union(None if view is None else view.region, self._shadow_region(camera_from_probe, ratio))
         if region is None:
@@ -227,7 +228,7 @@ class Relighter:
 
     def _shadow_region(self, camera_from_probe: Pose, ratio: NDArray[np.float32]) -> Region | None:
         """Pixels that see the darkened part of the plane."""
-        box = dark_texels(ratio, _DARKENING)
+        box = dark_texels(ratio)
         if box is None:
             return None
         outline = self.transfer.shadow.grid.outline_mm(*box)

@@ -21,6 +21,16 @@ EXPORT HOT void irradiance_ratio(
     }
 }
 
+/* Lets darkening, of the colour that is darkened most, fade from twice `faint` down to nothing at `faint`. */
+EXPORT HOT void drop_faint(float *ratio, int64_t count, float faint)
+{
+    for (int64_t i = 0; i < 4 * count; i += 4) {
+        float darkening = 1.0f - ratio[i + 3], kept = lesser(greater(darkening / faint - 1.0f, 0.0f), 1.0f);
+        for (int64_t k = 0; k < 4; k++)
+            ratio[i + k] = 1.0f - kept * (1.0f - ratio[i + k]);
+    }
+}
+
 /* First and last column and row, (4,), of the texels whose ratio is below a limit; if none is, last before first. */
 EXPORT void dark_box(const float *ratio, int64_t side, double limit, int64_t *box)
 {

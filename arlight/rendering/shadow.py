@@ -14,9 +14,10 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.float32]
 
 _native = library(__file__, "shadow")
-_native.irradiance_ratio.restype = _native.dark_box.restype = None
+_native.irradiance_ratio.restype = _native.dark_box.restype = _native.drop_faint.restype = None
 _pointer, _integer = ctypes.c_void_p, ctypes.c_int64
 _native.irradiance_ratio.argtypes = [_pointer, _integer, _pointer, _integer, _pointer]
+_native.drop_faint.argtypes = [_pointer, _integer, ctypes.c_float]
 _native.dark_box.argtypes = [_pointer, _integer, ctypes.c_double, _pointer]
 _REACH_HEIGHTS = 1.0
 """How far the map reaches beyond the object, in heights of the object: light above 45 degrees stays inside."""
@@ -117,10 +118,18 @@ def irradiance_ratio(hidden: Rows, open_plane: Rows, side: int) -> Rows:
     return ratio
 
 
-def dark_texels(ratio: Rows, darkening: float) -> tuple[int, int, int, int] | None:
-    """First and last column, first and last row of the texels (side, side, 4) darkened by more than a share."""
+def drop_faint(ratio: Rows, faint: float) -> None:
+    """Leave alone, in place, what is darkened (side, side, 4) by less than a share.
+
+    From twice the share down to it darkening fades to nothing, so that no contour shows where it ends.
+    """
+    _native.drop_faint(address(ratio, np.float32), ratio.shape[0] * ratio.shape[1], faint)
+
+
+def dark_texels(ratio: Rows) -> tuple[int, int, int, int] | None:
+    """First and last column, first and last row of the texels (side, side, 4) that are darkened at all."""
     box = (ctypes.c_int64 * 4)()
-    _native.dark_box(address(ratio, np.float32), ratio.shape[0], 1.0 - darkening, box)
+    _native.dark_box(address(ratio, np.float32), ratio.shape[0], 1.0, box)
     first_column, last_column, first_row, last_row = box
     return None if last_row < 0 else (first_column, last_column, first_row, last_row)
 

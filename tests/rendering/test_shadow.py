@@ -5,7 +5,7 @@ import trimesh
 from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.fourier import pack_real
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.shadow import PlaneGrid, PlaneShadow
+from arlight.rendering.shadow import PlaneGrid, PlaneShadow, drop_faint
 from arlight.rendering.transfer import precompute_transfer
 from arlight.synthetic.captured import load_environment
 
@@ -106,3 +106,19 @@ def test_openness_is_looked_up_where_a_falling_ray_lands():
     slanted = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
     found = shadow.openness_along(np.array([[0.5, 2.5, 2.0], [3.5, 0.5, 0.0], [3.5, 0.5, 9.0]]), slanted)
     assert np.allclose(found, [openness[2, 2], openness[0, 3], 1.0])
+
+
+def test_faint_darkening_fades_to_nothing_without_a_step():
+    darkening = np.linspace(0.0, 0.1, 2001).astype(np.float32)
+    ratio = np.ones((2001, 1, 4), np.float32)
+    ratio[:, 0, 3] = ratio[:, 0, 0] = 1.0 - darkening
+    ratio[:, 0, 1] = 1.0 - 0.5 * darkening
+    drop_faint(ratio, 0.01)
+    left = 1.0 - ratio[:, 0]
+    assert np.all(left[darkening < 0.01] == 0.0)
+    strong = darkening > 0.02
+    np.testing.assert_allclose(left[strong, 0], darkening[strong], atol=1e-6)
+    np.testing.assert_allclose(left[strong, 1], 0.5 * darkening[strong], atol=1e-6)
+    assert np.all(np.diff(left[:, 0]) >= -1e-6)
+    assert np.max(np.diff(left[:, 0])) < 4.0 * np.diff(darkening).max()
+    assert np.all(np.abs(left[:, 0] - darkening) <= 0.01 + 1e-6)
