@@ -98,7 +98,7 @@ class LightingTracker:
         self.effort = Effort()
         """Limits to the work on the frames to come; may change from frame to frame."""
         self._clock = clock
-        if self.settings.order != "auto":
+        if isinstance(self.settings.order, int):
             orders_up_to(probe.frequencies, self.settings.order)
         self._radiometry = camera.radiometry
         self._tracker = PoseTracker(probe, camera, self.settings.alignment_levels)
@@ -189,7 +189,13 @@ class LightingTracker:
         return last, measured
 
     def _order_to_measure(self, time_s: float) -> int:
-        order = self.settings.order if self.settings.order != "auto" else self._choice.order_to_measure(time_s)
+        match self.settings.order:
+            case "auto":
+                order = self._choice.order_to_measure(time_s)
+            case "all":
+                order = self._choice.highest
+            case order:
+                pass
         return order if self.effort.order is None else min(order, self.effort.order)
 
     def _filtered(self, raw: Lighting | None, frame: Frame, pose: ProbePose) -> Lighting | None:

@@ -51,7 +51,7 @@ def run(options: RunOptions) -> int:
 
 
 def _check_order(order: Order, footage: Footage) -> None:
-    if order != "auto" and not 0 <= order <= footage.probe.order:
+    if isinstance(order, int) and not 0 <= order <= footage.probe.order:
         raise ProbeError(
             f"--order {order}: {footage.probe_path} measures orders 0 to {footage.probe.order}; ask for one of those"
         )
@@ -81,7 +81,7 @@ def _pipeline(options: RunOptions, footage: Footage, budget: BudgetController | 
 
 def _told(order: Order) -> int | None:
     """Highest order that the outputs may have; None for the sheet's."""
-    return None if order == "auto" else order
+    return order if isinstance(order, int) else None
 
 
 def _process(
