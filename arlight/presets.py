@@ -38,13 +38,13 @@ class Preset:
 
 PRESETS: dict[PresetName, Preset] = {
     "fast": Preset(
-        TrackerSettings(samples_per_block=300),
-        RelightSettings(directions=192, shadow_texels=64, supersampling=1),
+        TrackerSettings(samples_per_block=200, estimate_every=3),
+        RelightSettings(directions=256, shadow_texels=64, supersampling=1, mesh_faces=8_000),
     ),
     "balanced": Preset(),
     "accurate": Preset(
-        TrackerSettings(samples_per_block=2400),
-        RelightSettings(directions=1536, shadow_texels=256, supersampling=3),
+        TrackerSettings(samples_per_block=2400, iterations=4, order="all"),
+        RelightSettings(directions=1536, shadow_texels=192, supersampling=4, mesh_faces=64_000),
         EncodingSettings("veryfast", 16),
     ),
 }

@@ -10,7 +10,7 @@ Order = int | Literal["auto", "all"]
 class TrackerSettings:
     """Choices that trade speed for accuracy."""
 
-    samples_per_block: int = 1200
+    samples_per_block: int = 400
     """Pixels a block is sampled with at most."""
     alignment_levels: int = 1
     """Levels of resolution that the pose is aligned on, 1 to 4; coarser ones are always there to fall back on."""

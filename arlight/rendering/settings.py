@@ -27,7 +27,7 @@ class RelightSettings:
     """ASSUMED albedo of what surrounds the object: light from below is this over pi times the irradiance, in [0, 1]."""
     directions: int = 512
     """Directions of the hemisphere along which the object's shadows are cast."""
-    shadow_texels: int = 128
+    shadow_texels: int = 96
     """Side of the map of the shadow on the sheet."""
     supersampling: int = 2
     """Samples along a pixel's side."""
