@@ -1,15 +1,15 @@
-/* Differential rendering in linear light: the plane darkens by a ratio, the object covers. */
+/* Differential rendering in linear light: the plane darkens by a ratio. */
 #include "native.h"
 
 enum {
     CELL = 8,     /* pixels between two nodes of the net of rays, as in composite.py */
-    STRETCH = 16, /* cells of a row that are looked up before they are multiplied */
+    STRETCH = 16, /* cells of a row that are looked up before they are written */
 };
 
 typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
 typedef struct {
-    float *linear;      /* (height, width, 3) a region of the frame */
+    float *gain;        /* (height, width, 3) what the light of a region of the frame is multiplied by */
     const float *rays;  /* (node_rows, node_columns, 2) undistorted rays (x, y, 1) at every CELL-th pixel */
     const float *ratio; /* (side, side, 4) red, green, blue, unused */
     int64_t x0, y0, width, height, node_columns, side;
@@ -55,8 +55,8 @@ static inline Four ratio_at(const Plane *p, float last, float u, float v)
     return upper + fv * (lower - upper);
 }
 
-/* Multiply by the ratio at each pixel's point of the plane; outside of the map, and above the horizon, by nothing. */
-EXPORT HOT void shade_plane(const Plane *p)
+/* The ratio at each pixel's point of the plane; 1 outside of the map, and above the horizon. */
+EXPORT HOT void plane_gain(const Plane *p)
 {
     float last = (float)(p->side - 1), u[CELL], v[CELL], factors[3 * CELL * STRETCH + 1];
     int64_t end = p->x0 + p->width;
@@ -72,21 +72,8 @@ EXPORT HOT void shade_plane(const Plane *p)
                     *(Four *)(factors + 3 * (i + j)) = ratio_at(p, last, u[j], v[j]);
             }
             int64_t first = cell * CELL < p->x0 ? p->x0 - cell * CELL : 0;
-            float *pixels = p->linear + 3 * (row * p->width + cell * CELL - p->x0);
+            float *pixels = p->gain + 3 * (row * p->width + cell * CELL - p->x0);
             for (int64_t i = 3 * first; i < 3 * stop; i++)
-                pixels[i] *= factors[i];
-        }
-}
-
-/* Lay radiance times coverage, and coverage, (height, width, 4) over linear light with rows of `stride` pixels. */
-EXPORT HOT void cover(float *linear, int64_t stride, const float *drawn, int64_t width, int64_t height)
-{
-    for (int64_t row = 0; row < height; row++)
-        for (int64_t column = 0; column < width; column++) {
-            const float *over = drawn + 4 * (row * width + column);
-            float *pixel = linear + 3 * (row * stride + column), left = 1.0f - over[3];
-            if (over[3] > 0.0f)
-                for (int channel = 0; channel < 3; channel++)
-                    pixel[channel] = pixel[channel] * left + over[channel];
+                pixels[i] = factors[i];
         }
 }

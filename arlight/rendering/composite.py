@@ -1,4 +1,4 @@
-"""Differential rendering in linear light: the plane darkens by a ratio, the object covers, nothing else changes."""
+"""Differential rendering in linear light: the plane darkens by a ratio, nothing else changes."""
 
 import ctypes
 
@@ -15,14 +15,13 @@ Image = NDArray[np.float32]
 _CELL_PX = 8
 """Between two nodes of the net of rays, as in composite.c: a lens bends what lies between by less than 0.02 px."""
 _native = library(__file__, "composite")
-_native.shade_plane.restype = _native.cover.restype = None
-_native.shade_plane.argtypes = [ctypes.c_void_p]
-_native.cover.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+_native.plane_gain.restype = None
+_native.plane_gain.argtypes = [ctypes.c_void_p]
 
 
 class _Plane(Workspace):
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("linear", "rays", "ratio")),
+        *((name, ctypes.c_void_p) for name in ("gain", "rays", "ratio")),
         *((name, ctypes.c_int64) for name in ("x0", "y0", "width", "height", "node_columns", "side")),
         ("texel_from_ray", ctypes.c_double * 9),
     )
@@ -44,6 +43,7 @@ class PlaneShader:
         rays = camera.rays(nodes.reshape(-1, 2)).astype(np.float32)
         self._plane = _Plane(node_columns=len(x), side=grid.side)
         self._plane.hold({"rays": rays})
+        self._buffer = np.empty(0, np.float32)
         self._texel_from_plane = np.array(
             [
                 [1.0 / grid.texel_mm, 0.0, -grid.corner_mm[0] / grid.texel_mm - 0.5],
@@ -52,36 +52,36 @@ class PlaneShader:
             ]
         )
 
-    def shade(self, linear: Image, region: Region, camera_from_probe: Pose, ratio: Image) -> None:
-        """Multiply a region of the frame, in place, by the ratio at the point of the plane that each pixel sees.
+    def gain(self, region: Region, camera_from_probe: Pose, ratio: Image) -> Image:
+        """What the light of every pixel is multiplied by: the ratio at the point of the plane that it sees.
 
         Args:
-            linear: (h, w, 3) linear light of `region`, changed in place.
             region: pixels of the frame.
             camera_from_probe: the pose.
             ratio: (side, side, 4) irradiance with the object over irradiance without, and an unused column.
+
+        Returns:
+            (h, w, 3) of the region, 1 where no point of the map is seen; overwritten by the next call.
         """
         rotation, plane = camera_from_probe.rotation, self._plane
-        if linear.shape != (region.size[1], region.size[0], 3) or ratio.shape != (plane.side, plane.side, 4):
-            raise ValueError(
-                f"linear {linear.shape} or ratio {ratio.shape} do not fit {region} and {plane.side} texels"
-            )
+        if ratio.shape != (plane.side, plane.side, 4):
+            raise ValueError(f"expected a ratio of {plane.side} texels a side, found {ratio.shape}")
+        gain = self._room(*region.size)
         homography = np.column_stack([rotation[:, 0], rotation[:, 1], camera_from_probe.translation])
         try:
             texel_from_ray = self._texel_from_plane @ np.linalg.inv(homography)
         except np.linalg.LinAlgError:
-            return  # seen edge-on the plane has no pixels
+            gain.fill(1.0)  # seen edge-on the plane has no pixels
+            return gain
         plane.texel_from_ray[:] = texel_from_ray.reshape(-1).tolist()
         plane.x0, plane.y0 = region.x0, region.y0
         plane.width, plane.height = region.size
-        plane.linear, plane.ratio = address(linear, np.float32), address(ratio, np.float32)
-        _native.shade_plane(ctypes.byref(plane))
+        plane.gain, plane.ratio = address(gain, np.float32), address(ratio, np.float32)
+        _native.plane_gain(ctypes.byref(plane))
+        return gain
 
-
-def cover(linear: Image, x: int, y: int, drawn: Image) -> None:
-    """Lay premultiplied radiance and coverage (h, w, 4) over linear light, in place, its top left pixel at (x, y)."""
-    (height, width), (rows, columns) = drawn.shape[:2], linear.shape[:2]
-    if x < 0 or y < 0 or x + width > columns or y + height > rows:
-        raise ValueError(f"a picture of {width}x{height} at ({x}, {y}) leaves the region of {columns}x{rows} pixels")
-    start = address(linear, np.float32) + 12 * (y * columns + x)
-    _native.cover(start, columns, address(drawn, np.float32), width, height)
+    def _room(self, width: int, height: int) -> Image:
+        """Memory that was touched before: to get it afresh for every frame takes longer than to fill it."""
+        if self._buffer.size < 3 * width * height:
+            self._buffer = np.empty(3 * width * height, np.float32)
+        return self._buffer[: 3 * width * height].reshape(height, width, 3)

@@ -13,7 +13,7 @@ from arlight.estimation.order_choice import Need
 from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
 from arlight.rendering.appearance import Appearance, appearance
-from arlight.rendering.composite import PlaneShader, cover
+from arlight.rendering.composite import PlaneShader
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.light_rows import LightRows
 from arlight.rendering.mesh import Mesh
@@ -146,12 +146,10 @@ class Relighter:
         region = union(None if view is None else view.region, self._shadow_region(camera_from_probe, ratio))
         if region is None:
             return frame
-        linear = frame.linear_rgb(region)
-        self._plane_shader.shade(linear, region, camera_from_probe, ratio)
-        if view is not None:
-            drawn = self._draw(view, packed, supersampling)
-            cover(linear, view.region.x0 - region.x0, view.region.y0 - region.y0, drawn)
-        return frame.with_linear_rgb(region, linear)
+        gain = self._plane_shader.gain(region, camera_from_probe, ratio)
+        if view is None:
+            return frame.composed(region, gain)
+        return frame.composed(region, gain, self._draw(view, packed, supersampling), view.region)
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""

@@ -1,4 +1,4 @@
-/* Chroma averaged from rows of pixels that come from top to bottom: a few rows are kept, never the whole region. */
+/* Rows of pixels written as codes from top to bottom, chroma averaged: a few rows are kept, never the whole region. */
 #ifndef ARLIGHT_VIDEO_AVERAGING_H
 #define ARLIGHT_VIDEO_AVERAGING_H
 
@@ -14,11 +14,11 @@ enum { CHANGED, OLD_CB, OLD_CR, NEW_CB, NEW_CR, KINDS };
 struct averaging {
     const struct axis *columns, *rows;
     int32_t x0, y0, x1, y1;             /* pixels that are there; samples that average others are left alone */
-    int32_t first, count;               /* chroma columns */
+    int32_t first, end;                 /* chroma columns */
     int32_t next;                       /* chroma row */
     float *kept[KEPT][KINDS];           /* (x1 - x0) pixels' row y in place y % KEPT */
     float *sums[KINDS];                 /* (x1 - x0) weighted sums of rows */
-    float *means[KINDS];                /* (count) */
+    float *means[KINDS];                /* (end - first) */
 };
 
 /* Lines that `averaging_begin` takes from its scratch memory. */
@@ -42,29 +42,29 @@ static inline void averaging_begin(struct averaging *work, const struct layout *
     }
     work->first = columns->lower[there.x0];
     work->next = rows->lower[there.y0];
-    int32_t end = columns->upper[there.x1 - 1] + 1;
-    while (work->first < end && columns->tapped[work->first] < there.x0)
+    work->end = columns->upper[there.x1 - 1] + 1;
+    const int32_t *last = columns->tapped + (columns->taps - 1) * columns->samples;
+    while (work->first < work->end && columns->tapped[work->first] < there.x0)
         work->first++;
-    while (end > work->first && columns->tapped[(columns->taps - 1) * columns->samples + end - 1] >= there.x1)
-        end--;
-    work->count = end - work->first;
+    while (work->end > work->first && last[work->end - 1] >= there.x1)
+        work->end--;
     while (work->next < rows->samples && rows->tapped[work->next] < there.y0)
         work->next++;
 }
 
-/* Averages the kept rows of some kinds at the chroma samples of row r. */
-static inline void average_rows(struct averaging *work, int32_t r, int first_kind)
+/* Averages the kept rows, from a kind on, at the samples first <= c < end of chroma row r. */
+static inline void average_rows(struct averaging *work, int32_t r, int kind, int32_t first, int32_t end)
 {
-    const struct axis *rows = work->rows;
-    int32_t width = work->x1 - work->x0;
-    for (int k = first_kind; k < KINDS; k++) {
-        memset(work->sums[k], 0, (size_t)width * sizeof(float));
+    const struct axis *rows = work->rows, *columns = work->columns;
+    int32_t start = columns->tapped[first], last = columns->tapped[(columns->taps - 1) * columns->samples + end - 1];
+    for (int k = kind; k < KINDS; k++) {
+        float *sum = work->sums[k];
+        memset(sum, 0, (size_t)(last + 1 - start) * sizeof(float));
         for (int32_t t = 0; t < rows->taps; t++) {
-            int32_t y = rows->tapped[t * rows->samples + r];
-            add_line(work->sums[k], work->kept[y % KEPT][k], rows->tap_weights[t], width);
+            const float *line = work->kept[rows->tapped[t * rows->samples + r] % KEPT][k] + (start - work->x0);
+            add_line(sum, line, rows->tap_weights[t], last + 1 - start);
         }
-        average_columns(work->columns, work->sums[k], work->x0, work->first, work->first + work->count,
-                        work->means[k]);
+        average_columns(columns, sum, start, first, end, work->means[k]);
     }
 }
 
@@ -75,6 +75,25 @@ static inline int32_t averaging_next(struct averaging *work, int32_t y)
     if (work->next >= rows->samples || rows->tapped[(rows->taps - 1) * rows->samples + work->next] > y)
         return -1;
     return work->next++;
+}
+
+/* Rounds values into a row of codes where they changed. */
+static HOT void write_changed(uint8_t *row, int32_t wide, int32_t first, const float *restrict values,
+                              const float *restrict changed, int32_t count, float zero, float span, float top)
+{
+    if (wide) {
+        uint16_t *codes = (uint16_t *)row + first;
+        for (int32_t i = 0; i < count; i++) {
+            int32_t code = nearest_code(values[i], zero, span, top), old = codes[i];
+            codes[i] = (uint16_t)(changed[i] > 0.0f ? code : old);
+        }
+    } else {
+        uint8_t *codes = row + first;
+        for (int32_t i = 0; i < count; i++) {
+            int32_t code = nearest_code(values[i], zero, span, top), old = codes[i];
+            codes[i] = (uint8_t)(changed[i] > 0.0f ? code : old);
+        }
+    }
 }
 
 #endif

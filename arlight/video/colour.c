@@ -22,8 +22,8 @@ EXPORT void read_colour(const struct layout *layout, const struct picture *pictu
     int32_t width = box->x1 - box->x0;
     rows_begin(&rows, layout, picture, *box, guided, scratch);
     for (int32_t y = box->y0; y < box->y1; y++, out += 3 * width) {
-        rows_read(&rows, y);
-        rows_colour(&rows, *curve, 0, width);
+        rows_read(&rows, y, box->x0, box->x1);
+        rows_colour(&rows, *curve, box->x0, box->x1);
         interleave(rows.rgb[0], rows.rgb[1], rows.rgb[2], width, out);
     }
 }

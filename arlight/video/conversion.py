@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from arlight.native import library
 from arlight.video.curves import IDENTITY, TABLE_SIZE, Curve, decoding_table, encoding_table
-from arlight.video.layout import POINTERS, BoxBounds, CurveTable, Layout, PictureCodes, layout_of
+from arlight.video.layout import POINTERS, BoxBounds, CurveTable, LayersOfLight, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
 
 __all__ = [
-    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "converted", "decoding_table", "encoded_rgb",
-    "encoding_table", "full_range_luma", "linear_luma", "linear_rgb", "replaced", "with_chroma",
+    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "composed", "converted", "decoding_table",
+    "encoded_rgb", "encoding_table", "full_range_luma", "linear_luma", "linear_rgb", "with_chroma",
 ]  # fmt: skip
 
 Upsampling = Literal["guided", "bilinear"]
@@ -32,21 +32,24 @@ Box = tuple[int, int, int, int]
 FloatImage = NDArray[np.float32]
 
 _LAYOUT, _PICTURE, _BOX, _CURVE = (POINTERS[kind] for kind in (Layout, PictureCodes, BoxBounds, CurveTable))
-_colour, _replacement = library(__file__, "colour"), library(__file__, "replacement")
+_colour, _composition = library(__file__, "colour"), library(__file__, "composition")
+_resampling = library(__file__, "resampling")
 _colour.read_colour.argtypes = [_LAYOUT, _PICTURE, _BOX, c_int32, _CURVE, c_void_p, c_void_p]
 _colour.read_luma.argtypes = [_LAYOUT, _PICTURE, _BOX, _CURVE, c_void_p]
 _colour.read_bytes.argtypes = [_LAYOUT, _PICTURE, c_int32, c_void_p, c_int32, c_int32, c_void_p, c_void_p]
-_replacement.replace_colour.argtypes = [_LAYOUT, _PICTURE, _PICTURE, _BOX, _BOX, c_void_p, c_void_p]
-_replacement.convert_colour.argtypes = [
+_composition.compose_layers.argtypes = [
+    _LAYOUT, _PICTURE, _PICTURE, POINTERS[LayersOfLight], _BOX, c_void_p, c_void_p,
+]  # fmt: skip
+_resampling.convert_colour.argtypes = [
     _LAYOUT, _PICTURE, _LAYOUT, _PICTURE, _BOX, c_int32, c_void_p, c_void_p, c_void_p,
 ]  # fmt: skip
 for _function in (
-    _colour.read_colour, _colour.read_luma, _colour.read_bytes, _replacement.replace_colour,
-    _replacement.convert_colour,
+    _colour.read_colour, _colour.read_luma, _colour.read_bytes, _composition.compose_layers, _resampling.convert_colour,
 ):  # fmt: skip
     _function.restype = None
 _READING_LINES = c_int32.in_dll(_colour, "reading_lines").value
-_WRITING_LINES = c_int32.in_dll(_replacement, "writing_lines").value
+_COMPOSING_LINES = c_int32.in_dll(_composition, "composing_lines").value
+_RESAMPLING_LINES = c_int32.in_dll(_resampling, "resampling_lines").value
 _LINE_MARGIN = c_int32.in_dll(_colour, "line_margin").value
 
 
@@ -97,15 +100,29 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
     return (planes[0], neutral, neutral), colour
 
 
-def replaced(planes: Planes, format_: PixelFormat, box: Box, linear: FloatImage) -> Planes:
-    """Planes with the linear light (h, w, 3) of a region replaced where it differs, rounded to the nearest codes."""
+def composed(
+    planes: Planes, format_: PixelFormat, box: Box, gain: FloatImage | None, over: FloatImage | None, over_box: Box
+) -> Planes:
+    """Planes with the light of a region times a gain, then covered by a layer, rounded to the nearest codes.
+
+    Args:
+        box: the region [px].
+        gain: (h, w, 3) of the region; None for 1.
+        over: light times coverage, and coverage (h, w, 4) of `over_box`; None for nothing.
+        over_box: inside the region [px].
+    """
     out = tuple(plane.copy() for plane in planes)
-    if linear.size:
+    if box[0] < box[2] and box[1] < box[3]:
         around = _with_shared_chroma(box, planes[0].shape, format_)
-        scratch = _scratch(around, _WRITING_LINES)
-        _replacement.replace_colour(
+        scratch = _scratch(around, _COMPOSING_LINES)
+        spans = np.empty((around[3] - around[1], 2), np.int32)
+        layers = LayersOfLight(
+            None if gain is None else gain.ctypes.data, None if over is None else over.ctypes.data, BoxBounds(*box),
+            BoxBounds(*over_box),
+        )  # fmt: skip
+        _composition.compose_layers(
             byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(PictureCodes.of(out)),
-            byref(BoxBounds(*box)), byref(BoxBounds(*around)), linear.ctypes.data, scratch.ctypes.data,
+            byref(layers), byref(BoxBounds(*around)), spans.ctypes.data, scratch.ctypes.data,
         )  # fmt: skip
     return out
 
@@ -125,8 +142,8 @@ def converted(planes: Planes, format_: PixelFormat, target: PixelFormat) -> Plan
     same = format_.matrix == target.matrix
     matrix = np.eye(3, dtype=np.float32) if same else target.ycc_from_rgb() @ format_.rgb_from_ycc()
     whole, all_pixels = (0, 0, w, h), np.ones(w, np.float32)
-    scratch = _scratch(whole, _WRITING_LINES)
-    _replacement.convert_colour(
+    scratch = _scratch(whole, _RESAMPLING_LINES)
+    _resampling.convert_colour(
         byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(_layout(out, target)),
         byref(PictureCodes.of(out)), byref(BoxBounds(*whole)), not same, matrix.ctypes.data, all_pixels.ctypes.data,
         scratch.ctypes.data,

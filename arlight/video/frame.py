@@ -29,6 +29,10 @@ class Region(NamedTuple):
         """The rectangle with a margin on every side; it may leave the picture."""
         return Region(self.x0 - margin_px, self.y0 - margin_px, self.x1 + margin_px, self.y1 + margin_px)
 
+    def joined(self, other: "Region") -> "Region":
+        """The smallest rectangle that holds both."""
+        return Region(min(self.x0, other.x0), min(self.y0, other.y0), max(self.x1, other.x1), max(self.y1, other.y1))
+
     def clipped(self, size: tuple[int, int]) -> "Region":
         """The part inside a picture of `size` (w, h) [px]; empty where they do not meet."""
         x0, y0 = min(max(self.x0, 0), size[0]), min(max(self.y0, 0), size[1])
@@ -114,11 +118,38 @@ class Frame:
             A frame in the same format; a grey frame becomes 4:2:0 colour.
         """
         inside = self._inside(region)
-        image = np.ascontiguousarray(linear, np.float32)
-        if image.shape != (inside.size[1], inside.size[0], 3):
-            raise ValueError(f"linear must be (h, w, 3) = {(*inside.size[::-1], 3)}, found {image.shape}")
+        image = _image(linear, inside, 3, "linear")
+        opaque = np.concatenate([image, np.ones((*image.shape[:2], 1), np.float32)], axis=2)
+        return self.composed(inside, over=opaque)
+
+    def composed(
+        self,
+        region: Region,
+        gain: ArrayLike | None = None,
+        over: ArrayLike | None = None,
+        over_region: Region | None = None,
+    ) -> "Frame":
+        """The frame with the light of a region changed; where it does not, codes stay bit by bit.
+
+        Args:
+            region: rectangle inside the picture [px].
+            gain: (h, w, 3) that the linear light of the region is multiplied by; 1 by default.
+            over: (h, w, 4) linear light times coverage, and coverage in [0, 1], that is then laid over it.
+            over_region: where, a rectangle inside the region [px]; all of it by default.
+
+        Returns:
+            A frame in the same format; a grey frame becomes 4:2:0 colour.
+        """
+        inside = self._inside(region)
+        covered = inside if over_region is None else Region(*over_region)
+        if over is not None and covered.joined(inside) != inside:
+            raise ValueError(f"over_region {tuple(covered)} leaves the region {tuple(inside)}")
+        factors = None if gain is None else _image(gain, inside, 3, "gain")
+        layer = None if over is None else _image(over, covered, 4, "over")
         planes, format_ = conversion.with_chroma(self.planes, self.format)
-        return replace(self, planes=conversion.replaced(planes, format_, inside, image), format=format_)
+        return replace(
+            self, planes=conversion.composed(planes, format_, inside, factors, layer, covered), format=format_
+        )
 
     def converted(self, target: PixelFormat) -> "Frame":
         """The frame in another Y'CbCr format of the same transfer, for an encoder that cannot take its own."""
@@ -131,3 +162,12 @@ class Frame:
         if region.clipped(self.size) != region:
             raise ValueError(f"region {tuple(region)} leaves the picture of {self.size[0]}x{self.size[1]} pixels")
         return region
+
+
+def _image(values: ArrayLike, region: Region, channels: int, name: str) -> FloatImage:
+    """Values (h, w, channels) of a region as compiled code takes them."""
+    image = np.ascontiguousarray(values, np.float32)
+    expected = (*region.size[::-1], channels)
+    if image.shape != expected:
+        raise ValueError(f"{name} must be (h, w, {channels}) = {expected}, found {image.shape}")
+    return image

@@ -145,30 +145,31 @@ static HOT void guide(const float *restrict luma, const float *restrict low, int
     }
 }
 
-/* Fills `ycc` with row y of the region; rows are to be asked for from top to bottom. */
-static inline void rows_read(struct rows *rows, int32_t y)
+/* Fills `ycc` with the pixels x0 <= x < x1 of row y of the region; rows are to be asked for from top to bottom. */
+static inline void rows_read(struct rows *rows, int32_t y, int32_t x0, int32_t x1)
 {
     const struct layout *layout = rows->layout;
-    struct box box = rows->box;
+    int32_t at = x0 - rows->box.x0, width = x1 - x0;
     float share = layout->rows.weight[y], *low = rows->pixels;
-    read_codes(row_of(rows->picture, 0, y), layout->wide, box.x0, box.x1 - box.x0, layout->black,
-               1.0f / layout->luma_span, rows->ycc[0]);
+    read_codes(row_of(rows->picture, 0, y), layout->wide, x0, width, layout->black, 1.0f / layout->luma_span,
+               rows->ycc[0] + at);
     float **above = hold_chroma(rows, layout->rows.lower[y]), **below = hold_chroma(rows, layout->rows.upper[y]);
     for (int k = 0; k < 2 + rows->guided; k++) {
         mix(above[k], below[k], share, rows->count, rows->between);
-        spread(&layout->columns, rows->between, rows->first, box.x0, box.x1, k < 2 ? rows->ycc[k + 1] : low);
+        spread(&layout->columns, rows->between, rows->first, x0, x1, k < 2 ? rows->ycc[k + 1] + at : low);
     }
     if (rows->guided)
-        guide(rows->ycc[0], low, box.x1 - box.x0, rows->ycc[1], rows->ycc[2]);
+        guide(rows->ycc[0] + at, low, width, rows->ycc[1] + at, rows->ycc[2] + at);
 }
 
-/* Fills `rgb` with the row's colour through a curve, for `count` pixels from `first` of the region's on. */
-static inline void rows_colour(struct rows *rows, struct curve curve, int32_t first, int32_t count)
+/* Fills `rgb` with the colour of the same pixels through a curve. */
+static inline void rows_colour(struct rows *rows, struct curve curve, int32_t x0, int32_t x1)
 {
-    float *ycc[3] = {rows->ycc[0] + first, rows->ycc[1] + first, rows->ycc[2] + first};
+    int32_t at = x0 - rows->box.x0, width = x1 - x0;
+    float *ycc[3] = {rows->ycc[0] + at, rows->ycc[1] + at, rows->ycc[2] + at};
     for (int k = 0; k < 3; k++) {
-        locate_component(curve, rows->layout->rgb_from_ycc + 3 * k, ycc, count, rows->step, rows->share);
-        look_up(curve, rows->step, rows->share, count, rows->rgb[k]);
+        locate_component(curve, rows->layout->rgb_from_ycc + 3 * k, ycc, width, rows->step, rows->share);
+        look_up(curve, rows->step, rows->share, width, rows->rgb[k] + at);
     }
 }
 

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from arlight.camera import Camera, Pose
-from arlight.rendering.composite import PlaneShader, cover
+from arlight.rendering.composite import PlaneShader
 from arlight.rendering.shadow import PlaneGrid
 from arlight.video.frame import Region
 
 
 def shade_plane(linear, region, camera, pose, grid, ratio):
     padded = np.concatenate([ratio, np.zeros((*ratio.shape[:2], 1))], axis=2).astype(np.float32)
-    PlaneShader(camera, grid).shade(linear, region, pose, padded)
+    linear *= PlaneShader(camera, grid).gain(region, pose, padded)
 
 
 def ramp_ratio(grid):
@@ -60,26 +60,6 @@ def test_above_the_horizon_there_is_no_plane(camera, looking_down):
     shade_plane(linear, Region(0, 0, 320, 240), camera, looking_down(85.0, 300.0), grid, nothing)
     assert np.all(linear[0] == 1.0)
     assert np.any(linear == 0.0)
-
-
-def test_cover_is_over_in_linear_light():
-    linear = np.full((6, 8, 3), 0.4, np.float32)
-    drawn = np.zeros((2, 3, 4), np.float32)
-    drawn[0, 0] = [0.9, 0.1, 0.0, 1.0]
-    drawn[1, 2] = [0.1, 0.0, 0.2, 0.25]
-    cover(linear, 4, 3, drawn)
-    assert np.allclose(linear[3, 4], [0.9, 0.1, 0.0])
-    assert np.allclose(linear[4, 6], [0.4, 0.3, 0.5])
-    linear[3, 4] = linear[4, 6] = 0.4
-    assert np.all(linear == np.float32(0.4))
-
-
-def test_cover_refuses_what_leaves_the_region():
-    linear, drawn = np.zeros((6, 8, 3), np.float32), np.ones((2, 3, 4), np.float32)
-    for x, y in ((-1, 0), (0, -1), (6, 0), (0, 5)):
-        with pytest.raises(ValueError, match="leaves the region"):
-            cover(linear, x, y, drawn)
-    assert not linear.any()
 
 
 def test_every_pixel_of_a_bent_picture_sees_the_plane_where_the_lens_says(camera, looking_down):
