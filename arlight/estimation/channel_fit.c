@@ -3,8 +3,8 @@
 #include "error_scale.h"
 #include "sheet_match.h"
 
-#define FIRST_SPARKLE 0.02 /* usual deviation of what a block mirrors by itself while nothing is known, relative to white:
-                              wide enough that no lamp pulls the solution before it is recognised */
+#define FIRST_SPARKLE 0.02 /* usual deviation of what a block mirrors by itself while nothing is known, relative to
+                              white: wide enough that no lamp pulls the solution before it is recognised */
 
 /* Room that a fit needs [planes]. */
 EXPORT const int64_t channel_planes = PLANES;
@@ -68,8 +68,8 @@ static void look_for(ChannelFit *f, int64_t amplitudes)
     f->width = (amplitudes + 2 + LANES - 1) / LANES * LANES;
 }
 
-/* Fits a channel; green comes first. Weights and solution are refined `passes` times, and the nuisance with the last, or
-   with each. */
+/* Fits a channel; green comes first. Weights and solution are refined `passes` times, and the nuisance with the last,
+   or with each. */
 EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t settle)
 {
     turn_to(f, channel);

@@ -19,7 +19,7 @@ typedef struct {
     int64_t field, width;   /* amplitudes that are looked for at the time, and the same for these */
     int64_t wide;           /* length of a row of coefficients in whole lanes */
     const int32_t *first;   /* (frequencies + 2) first block of each frequency; those without pattern come first */
-    const double *spread;   /* (2k - 1) prior deviation of the coefficients for an irradiance of 1, the first as it is */
+    const double *spread;   /* (2k - 1) prior deviation of the coefficients for an irradiance of 1; L_0's own */
     const double *colorful; /* (2k - 1) the same of red's and blue's difference from green */
     const double *mean_model;  /* (stride) deviation of the model's error in the means, relative to white */
     double *basis;          /* (stride, row) reflection field of each block, before Fresnel's factor */

@@ -107,34 +107,39 @@ class SheetFit:
             white_per_irradiance: radiance of white for L~_0 = 1.
         """
         stride, modes = len(response.cosine), basis.shape[1]
-        sequence, field = response.sequence, modes + 1
-        width = _whole(field + 2)
-        self._first = np.searchsorted(response.places[sequence, 1], [0, *range(1, 2 * len(frequencies), 2)])
+        field = modes + 1
+        self._first = np.searchsorted(response.places[response.sequence, 1], [0, *range(1, 2 * len(frequencies), 2)])
         self._frequencies = frequencies
-        rows = np.zeros((stride, width))
-        rows[: len(sequence), 0], rows[: len(sequence), 2:field] = basis[sequence, 0], basis[sequence, 1:]
-        model = np.zeros(stride)
-        model[: len(sequence)] = mean_model[sequence]
         self.nuisances, self.scales = np.zeros((CHANNELS, _NUISANCES)), np.ones((CHANNELS, 2))
         self.spreads = np.zeros(CHANNELS)
         self.lamps, self.weights = np.zeros((CHANNELS, stride)), np.ones((CHANNELS, stride))
         self.reflection, self.predicted = np.zeros((CHANNELS, stride)), np.zeros((CHANNELS, ROWS, stride))
-        self._blocks = blocks
+        self._blocks, self._response = blocks, response
         self.native = _ChannelFit(
-            m=ctypes.addressof(blocks.native), modes=field, coarse=2 + int(_COARSE * (modes - 1)), row=width,
+            m=ctypes.addressof(blocks.native),
+            modes=field, coarse=2 + int(_COARSE * (modes - 1)), row=_whole(field + 2),
             white_per_irradiance=white_per_irradiance, lamp_freedom=lamps.FREEDOM,
             weight_freedom=robust_weights.FREEDOM, weakest=stripe_rows.WEAKEST_TRANSFER,
         )  # fmt: skip
+        self._pointer = ctypes.byref(self.native)
+        self._hold(basis, mean_model)
+        self._make_room(stride, self.native.row)
+
+    def _hold(self, basis: Array, mean_model: Array) -> None:
+        """Give the compiled code what stays and what it fills."""
+        stride, sequence, field = len(self._response.cosine), self._response.sequence, self.native.modes
+        rows, model = np.zeros((stride, self.native.row)), np.zeros(stride)
+        # the second place is for green's pattern
+        rows[: len(sequence), 0], rows[: len(sequence), 2:field] = basis[sequence, 0], basis[sequence, 1:]
+        model[: len(sequence)] = mean_model[sequence]
         self.native.hold({
-            "first": self._first.astype(np.int32), "spread": prior_stddev(frequencies, 1.0),
-            "colorful": color_stddev(frequencies, 1.0, 1.0), "mean_model": model,
+            "first": self._first.astype(np.int32), "spread": prior_stddev(self._frequencies, 1.0),
+            "colorful": color_stddev(self._frequencies, 1.0, 1.0), "mean_model": model,
             "basis": rows, "basis_planes": np.ascontiguousarray(rows[:, :field].T),
-            "rows": response.rows, "lower": response.mirror,
+            "rows": self._response.rows, "lower": self._response.mirror,
             "nuisances": self.nuisances, "scales": self.scales, "spreads": self.spreads, "lamps": self.lamps,
             "weights": self.weights, "reflection": self.reflection, "predicted": self.predicted,
         })  # fmt: skip
-        self._pointer = ctypes.byref(self.native)
-        self._make_room(stride, width)
 
     def _make_room(self, stride: int, width: int) -> None:
         unknown = 2 * len(self._frequencies) - 1

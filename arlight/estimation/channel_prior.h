@@ -5,7 +5,7 @@
 #include "channel_fit.h"
 #include "prior.h"
 
-#define EXTRA_TO_SHADING 0.5 /* what a block mirrors by itself, relative to how uneven it is: a lamp's halo has a slope */
+#define EXTRA_TO_SHADING 0.5 /* what a block mirrors by itself, relative to how uneven it is: lamps have halos */
 #define EVEN 0.005           /* slope that noise and codec give an even block, relative to white */
 #define SPARKLE 0.0008       /* usual deviation of what a block mirrors by itself, relative to white */
 

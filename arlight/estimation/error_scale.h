@@ -1,8 +1,8 @@
 /* How large the model's errors are in a frame, told by the residuals: variance components by restricted likelihood.
 
-   The errors of a row are the pixels' noise, which is known, and a scale times a usual variance for what model and codec
-   leave out, with one scale for the means and one for the harmonics. A step of the minorise-maximise iteration raises
-   the likelihood of the residuals, of which the fit has taken its share; repeated frame by frame it converges.
+   The errors of a row are the pixels' noise, which is known, and a scale times a usual variance for what model and
+   codec leave out, with one scale for the means and one for the harmonics. A step of the minorise-maximise iteration
+   raises the likelihood of the residuals, of which the fit has taken its share; repeated frame by frame it converges.
 
    Source: Zhou, Hu, Zhou, Lange, "MM algorithms for variance components models", 2019, section 2, for residuals. */
 #ifndef ARLIGHT_ERROR_SCALE_H

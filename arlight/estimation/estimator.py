@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.channel_fit import GREEN, SheetFit
+from arlight.estimation.channel_fit import GREEN, FitResult, SheetFit
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.measured_blocks import CHANNELS, MeasuredBlocks
 from arlight.estimation.nuisance import Nuisance
@@ -116,41 +116,53 @@ class LightingEstimator:
         """
         start, fit = nuisance or Nuisance(), self._fit
         count = len(self._frequencies) if order is None else int(np.sum(orders_up_to(self._frequencies, order)))
-        used = fit.begin(count, start)
-        self._measured.gather(means, used)
-        white = self._measured.white
+        blocks = fit.begin(count, start)
+        self._measured.gather(means, blocks)
+        green = self._fit_green(start, blocks)
+        chi2 = (fit.fit(0).chi2 + green.chi2 + fit.fit(2).chi2) / CHANNELS
+        stripes, reflection = self._guide()
+        return Estimate(self._lighting(count, time_s, chi2), stripes, reflection, self._learnt(), green.unexplained)
+
+    def _fit_green(self, start: Nuisance, blocks: int) -> FitResult:
+        """Fit green from where the last frame left off; a first frame settles, the light's shape among the rest."""
+        fit = self._fit
         if start.blocks is None:
             fit.forget()
         else:
-            np.multiply(start.blocks[0], white[GREEN] ** 2, out=fit.lamps[GREEN])
+            np.multiply(start.blocks[0], self._measured.white[GREEN] ** 2, out=fit.lamps[GREEN])
             fit.weights[GREEN] = start.blocks[1]
-        self._response.fill(used, start.shape)
-        if start.shape is None:
-            fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
-            self._response.fill(used, _shape(fit.packed[GREEN]))
-            green = fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
-        else:
-            green = fit.fit(GREEN, self._iterations)
-        chi2 = (fit.fit(0).chi2 + green.chi2 + fit.fit(2).chi2) / CHANNELS
+        self._response.fill(blocks, start.shape)
+        if start.shape is not None:
+            return fit.fit(GREEN, self._iterations)
+        fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
+        self._response.fill(blocks, _shape(fit.packed[GREEN]))
+        return fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
+
+    def _guide(self) -> tuple[Array, Array]:
+        """Stripes (blocks, 7, 3) to expect next, and reflection (blocks, 3); 0 in blocks that were not estimated."""
         stripes, reflection = np.zeros((self._count, ROWS, CHANNELS)), np.zeros((self._count, CHANNELS))
         _native.guide(
             ctypes.addressof(self._measured.native),
-            fit.native.predicted,
-            fit.native.reflection,
+            self._fit.native.predicted,
+            self._fit.native.reflection,
             address(stripes, np.float64),
             address(reflection, np.float64),
         )
+        return stripes, reflection
+
+    def _learnt(self) -> Nuisance:
+        """Where the next frame starts."""
+        fit = self._fit
         blocks = np.empty((2, len(fit.lamps[GREEN])))
-        np.multiply(fit.lamps[GREEN], 1.0 / white[GREEN] ** 2, out=blocks[0])
+        np.multiply(fit.lamps[GREEN], 1.0 / self._measured.white[GREEN] ** 2, out=blocks[0])
         blocks[1] = fit.weights[GREEN]
-        learnt = Nuisance.of(
+        return Nuisance.of(
             fit.nuisances[GREEN],
             color_spread=(fit.spreads.item(0), fit.spreads.item(2)),
             error_scale=tuple(map(tuple, fit.scales.tolist())),
             shape=_shape(fit.packed[GREEN]),
             blocks=blocks,
         )
-        return Estimate(self._lighting(count, time_s, chi2), stripes, reflection, learnt, green.unexplained)
 
     def _lighting(self, count: int, time_s: float, chi2: float) -> Lighting:
         packed, covariance = self._fit.packed, self._fit.covariance

@@ -17,8 +17,8 @@ static const double MOST[NUISANCES] = {6.0, 0.01, 1.5, 0.3, 0.3};
 /* Normal equations of the nuisance. */
 typedef struct {
     double information[NUISANCES][NUISANCES], right[NUISANCES]; /* the light being free */
-    double step[NUISANCES];                                    /* of Gauss and Newton */
-    double doubt[NUISANCES][NUISANCES];                        /* lower; its transpose times it: covariance at the end */
+    double step[NUISANCES];                                     /* of Gauss and Newton */
+    double doubt[NUISANCES][NUISANCES]; /* lower triangle whose transpose times it is the covariance after the step */
 } Step;
 
 /* Change of four blocks' rows with the nuisance. */

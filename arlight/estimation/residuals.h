@@ -35,7 +35,7 @@ static HOT void miss(const ChannelFit *f, double mean, const double *step)
     }
 }
 
-/* Sum of four blocks' squared residuals, relative to their variances, over the usable rows of the mean or the others. */
+/* Sum of four blocks' squared residuals, relative to their variances, over the usable rows of some. */
 INLINE lanes squares(const ChannelFit *f, int64_t b, int from, int to)
 {
     lanes extra = at(f, EXTRA, b), trust = at(f, TRUST, b), noise = at(f, NOISE, b), sum = splat(0.0);

@@ -14,7 +14,7 @@ typedef struct {
     int64_t stride;             /* length of a plane */
     int64_t columns;            /* 3, or 5 where the film has a second harmonic */
     int64_t unknown;            /* real coefficients of the light, 2k - 1, filled up to whole lanes */
-    int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0: no such light */
+    int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0 without it */
     int64_t parts;              /* of such light's series that are not 0 */
     int64_t folded;             /* whether light of twice the frequency is counted with that of L_0, by the shape */
     double index;               /* of refraction */

@@ -7,6 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from arlight.estimation.channel_fit import GREEN, SheetFit
+from arlight.estimation.measured_blocks import MeasuredBlocks
+from arlight.estimation.nuisance import Nuisance
 from arlight.estimation.response import BlockResponse, optical_transfer
 from arlight.fourier import pack_real
 from arlight.probe.design import Probe
@@ -138,3 +141,48 @@ def lit(probe: Probe, response: BlockResponse) -> Callable[..., BlockMeans]:
 def lit_as_usual(lit: Callable[..., BlockMeans]) -> Callable[..., BlockMeans]:
     """The same for light whose horizon does in the glass what a uniform sky's does, as the bare response has it."""
     return partial(lit, usual=True)
+
+
+@pytest.fixture(scope="session")
+def plane(probe):
+    """A reflection that is a plane over the sheet, rising from one side to the other."""
+    centers = np.array([block.center_mm for block in field_blocks(probe)])
+    return np.column_stack([np.ones(len(centers)), centers / 50.0])
+
+
+class Fitted:
+    """The compiled fit of a sheet, results in the sheet's own order."""
+
+    def __init__(self, probe, response, basis):
+        kinds = [block.kind for block in field_blocks(probe)]
+        self.response, self.basis, self.frequencies = response, basis, probe.frequencies
+        self.blocks = MeasuredBlocks(
+            kinds, response.sequence, probe.slab.refractive_index, response.phasor, response.cosine
+        )
+        self.mean_model = np.full(len(kinds), 0.001)
+        self.white_per_irradiance = probe.paper_reflectance * probe.film_transmittance**2 / np.pi
+        self.sheet = SheetFit(
+            self.blocks, response, probe.frequencies, basis, self.mean_model, self.white_per_irradiance
+        )
+
+    def start(self, means, nuisance=None, count=None):
+        count = count or len(self.frequencies)
+        self.nuisance = nuisance or Nuisance()
+        self.means = means
+        self.used = self.sheet.begin(count, self.nuisance)
+        self.blocks.gather(means, self.used)
+        self.response.fill(self.used)
+        self.sheet.forget()
+        return self
+
+    def planes(self, name, channel=GREEN):
+        """Of a channel, the last axis in the sheet's own order."""
+        planes = getattr(self.sheet, name)[channel]
+        natural = np.zeros((*planes.shape[:-1], len(self.response.sequence)))
+        natural[..., self.response.sequence] = planes[..., : len(self.response.sequence)]
+        return natural
+
+
+@pytest.fixture(scope="session")
+def fitted(probe, response, plane):
+    return Fitted(probe, response, plane)

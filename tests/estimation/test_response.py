@@ -7,7 +7,6 @@ import pytest
 from scipy.ndimage import gaussian_filter, uniform_filter
 
 from arlight.estimation.response import BlockResponse, optical_transfer
-from arlight.probe.assembly import Assembly, Print, Registration
 from arlight.probe.design import Block, Probe
 
 GLASS, INDEX = 2.44, 1.52
@@ -267,51 +266,6 @@ def test_views_without_any_common_direction_are_finite():
     for phasor in (1e-30j, -1e-30):
         np.testing.assert_allclose(response.light(with_phasor(probe, phasor)), nothing, atol=1e-6)
         assert np.all(np.isfinite(response.lower_mirror(with_phasor(probe, phasor))))
-
-
-PRINTED = Assembly(film=Print(dot_gain=0.12), paper=Print(Registration((0.05, -0.1), 0.1), dot_gain=0.1))
-"""A sheet whose film has a second harmonic and whose paper is printed beside its place."""
-
-
-@pytest.mark.parametrize("design", ["matched", "doubled"])
-def test_light_of_twice_the_frequency_counts_with_the_mean_by_its_share(design):
-    probe = probe_of(design)
-    _, _, _, _, view = case_of(design, 60)
-    response, means = BlockResponse(probe, PRINTED), means_seen(probe, view)
-    generator = np.random.default_rng(61)
-    shape = 0.2 * generator.normal(size=2 * len(probe.frequencies) - 1)
-    shape[0] = 1.0
-    rows = response.light(means, shape)
-    assert rows.shape[2] == 5
-    overtone = np.where(response.places[:, 3:] > 0, shape[response.places[:, 3:]], 0.0)
-    expected = rows[:, :, 0] + np.einsum("brk,bk->br", rows[:, :, 3:], overtone)
-    response.fill(len(probe.blocks), shape)
-    found = response.rows[:3, :, : len(probe.blocks)]
-    np.testing.assert_allclose(found[0].T, expected[response.sequence], atol=1e-14)
-    np.testing.assert_allclose(np.moveaxis(found[1:], 0, 2).swapaxes(0, 1), rows[response.sequence, :, 1:3], atol=1e-14)
-    # it is there, and small
-    assert 1e-4 < np.abs(expected - rows[:, :, 0]).max() < 0.1 * np.abs(expected).max()
-
-
-def test_a_part_of_the_sequence_is_the_same_part_of_all():
-    probe = probe_of("matched")
-    response = BlockResponse(probe)
-    _, _, _, _, view = case_of("matched", 62)
-    everything = response.light(means_seen(probe, view))
-    for planes in (response.rows, response.mirror):
-        planes[:] = np.nan
-    response.fill(9)
-    np.testing.assert_array_equal(
-        response.rows[..., :9], np.moveaxis(everything[response.sequence[:9]], 0, 2).swapaxes(0, 1)
-    )
-    # the lanes beyond are filled up, no more
-    assert np.all(np.isnan(response.rows[..., 12:]))
-
-
-def test_blocks_are_in_the_sequence_of_their_orders():
-    probe = probe_of("matched")
-    lengths = [np.hypot(*(probe.blocks[i].frequency or (0, 0))) for i in BlockResponse(probe).sequence]
-    assert np.all(np.diff(lengths) >= 0.0)
 
 
 @pytest.mark.parametrize("variance", [0.0, 0.3, 1.5])
