@@ -32,8 +32,17 @@ def _by_size() -> tuple[Workload, ...]:
 
 
 def grow_with_sheet_order(clips: Sequence[FilmedClip], frames: int, relighters: Relighters) -> Findings:
-    """Cost over the order of the sheet."""
-    return _grown("order of the sheet", [(clip.probe.order, _alone(clip, frames, relighters)) for clip in clips])
+    """Cost over the order of the sheet, the object as large on every sheet as on the last."""
+    found = []
+    for clip in clips:
+        share = clip.probe.sheet_mm[0] / clips[-1].probe.sheet_mm[0]
+        settings = RelightSettings(size_mm=RelightSettings().size_mm * share)
+        each = contender(
+            clip, TrackerSettings(order=clip.probe.order), relighters.of(clip.probe, clip.camera, settings)
+        )
+        contend(clip, frames, [each])
+        found.append((clip.probe.order, each))
+    return _grown("order of the sheet", found)
 
 
 def grow_with_order_setting(clip: FilmedClip, frames: int, relighters: Relighters) -> Findings:
@@ -67,7 +76,11 @@ def grow_with_size(folder: Path, frames: int, relighters: Relighters) -> Finding
 def grow_with_mesh(clip: FilmedClip, frames: int, relighters: Relighters) -> Findings:
     """Cost over the triangles that are drawn."""
     contenders = [
-        contender(clip, TrackerSettings(), relighters.of(clip.probe, clip.camera, RelightSettings(mesh_faces=faces)))
+        contender(
+            clip,
+            TrackerSettings(order=clip.probe.order),
+            relighters.of(clip.probe, clip.camera, RelightSettings(mesh_faces=faces)),
+        )
         for faces in MESH_FACES
     ]
     contend(clip, frames, contenders)
@@ -75,7 +88,7 @@ def grow_with_mesh(clip: FilmedClip, frames: int, relighters: Relighters) -> Fin
 
 
 def _alone(clip: FilmedClip, frames: int, relighters: Relighters) -> Contender:
-    each = contender(clip, TrackerSettings(), relighters.of(clip.probe, clip.camera))
+    each = contender(clip, TrackerSettings(order=clip.probe.order), relighters.of(clip.probe, clip.camera))
     contend(clip, frames, [each])
     return each
 

@@ -1,16 +1,12 @@
-"""The benchmark as a picture: the front, how cost grows, and the ratios to what users would otherwise use."""
-
-from typing import Any
+"""The benchmark as a picture: the front, the ratios to what users would otherwise use, and how cost grows."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from arlight.benchmark.speed.findings import Findings
+from arlight.benchmark.speed.front_picture import LINE, PRESET, draw_front
 from arlight.benchmark.speed.workloads import HEADLINE
 
-_PRESET, _POINT, _LINE = "#c1440e", "#7a8a99", "#2b4c6f"
-_TICKS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 _STAGES = (
     "track",
     "measure",
@@ -19,6 +15,7 @@ _STAGES = (
     "track to filter",
     "render",
     "composite",
+    "relight",
     "decode",
     "encode",
     "loop",
@@ -27,65 +24,32 @@ _STAGES = (
 
 def draw_benchmark(found: Findings) -> Figure:
     """The page; panels of what was not measured are left out."""
-    growth = found.details.get("growth", {})
-    front = found.details.get("front", [])
-    panels = 2 * bool(front) + 1 + len(growth)
-    rows = -(-panels // 2)
-    figure = Figure(figsize=(13.0, 4.6 * rows), layout="constrained")
-    axes = iter(figure.subplots(rows, 2, squeeze=False).ravel())
-    if front:
-        _draw_front(next(axes), front, "relighting_error", "error of the relit picture, %")
-        _draw_front(next(axes), front, "coefficient_error", "error of the coefficients, % of $L_0$")
+    growth, front = found.details.get("growth", {}), found.details.get("front", [])
+    rows = bool(front) + -(-(1 + len(growth)) // 2)
+    heights = [6.0] * bool(front) + [4.0] * (rows - bool(front))
+    figure = Figure(figsize=(14.0, sum(heights)), layout="constrained")
+    axes = iter(figure.subplots(rows, 2, squeeze=False, height_ratios=heights).ravel())
+    fronts = [next(axes), next(axes)] if front else []
     _draw_ratios(next(axes), found)
-    for axis, rows_of_axis in growth.items():
-        _draw_growth(next(axes), axis, rows_of_axis)
+    for axis, measured in growth.items():
+        _draw_growth(next(axes), axis, measured)
     for unused in axes:
         unused.set_axis_off()
+    if front:
+        # names are placed by where the panels are
+        figure.draw_without_rendering()
+        draw_front(fronts[0], front, "relighting_error", "error of the relit picture, %")
+        draw_front(fronts[1], front, "coefficient_error", "error of the coefficients, % of $L_0$")
+        for panel in fronts:
+            _finish(panel)
     return figure
-
-
-def _draw_front(axes: Axes, points: list[dict[str, Any]], error: str, label: str) -> None:
-    best = sorted(_undominated(points, error), key=lambda point: float(point["cost_ms"]["median"]))
-    axes.step(
-        [p["cost_ms"]["median"] for p in best], [100.0 * p[error] for p in best],
-        where="post", color=_LINE, linewidth=1.2, zorder=1, label="front",
-    )  # fmt: skip
-    for point in points:
-        x, y = point["cost_ms"]["median"], 100.0 * point[error]
-        preset = point["is_preset"]
-        axes.scatter([x], [y], s=70 if preset else 26, color=_PRESET if preset else _POINT,
-                     marker="D" if preset else "o", zorder=3 if preset else 2)  # fmt: skip
-        axes.annotate(
-            point["name"], (x, y), xytext=(5, 4), textcoords="offset points",
-            fontsize=8.5 if preset else 6.5, fontweight="bold" if preset else "normal",
-            color=_PRESET if preset else "#444444",
-        )  # fmt: skip
-    axes.set_xlabel("CPU time a frame, tracking to composite, ms")
-    axes.set_ylabel(label)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.margins(x=0.14, y=0.1)
-    for scale in (axes.xaxis, axes.yaxis):
-        scale.set_major_locator(LogLocator(subs=_TICKS))
-        scale.set_major_formatter(StrMethodFormatter("{x:g}"))
-        scale.set_minor_formatter(NullFormatter())
-    _finish(axes)
-
-
-def _undominated(points: list[dict[str, Any]], error: str) -> list[dict[str, Any]]:
-    costs = [(point["cost_ms"]["median"], point[error]) for point in points]
-    return [
-        point
-        for point, (x, y) in zip(points, costs, strict=True)
-        if not any(a <= x and b <= y and (a, b) != (x, y) for a, b in costs)
-    ]
 
 
 def _draw_ratios(axes: Axes, found: Findings) -> None:
     chosen = [(stage, found.ratios[key]) for stage in _STAGES if (key := f"{stage}, {HEADLINE}") in found.ratios]
     for row, (_stage, ratio) in enumerate(chosen):
         value = ratio.value
-        axes.barh(row, value.median, color=_LINE, height=0.6)
+        axes.barh(row, value.median, color=LINE, height=0.6)
         axes.plot([value.low, value.high], [row, row], color="#111111", linewidth=1.0)
         axes.annotate(f" {value.median:.2g}  of {ratio.over}", (value.high, row), va="center", fontsize=7.5)
     axes.axvline(1.0, color="#999999", linewidth=0.8, linestyle="--")
@@ -99,7 +63,7 @@ def _draw_ratios(axes: Axes, found: Findings) -> None:
 
 
 def _draw_growth(axes: Axes, axis: str, rows: list[dict[str, float]]) -> None:
-    for part, colour in (("estimate_ms", _LINE), ("relight_ms", _PRESET)):
+    for part, colour in (("estimate_ms", LINE), ("relight_ms", PRESET)):
         axes.plot([row["value"] for row in rows], [row[part] for row in rows], "o-", color=colour,
                   label=part.removesuffix("_ms"))  # fmt: skip
     if rows and rows[-1]["value"] > 100.0 * max(rows[0]["value"], 1.0) ** 0.5:
