@@ -31,7 +31,7 @@ class RunOptions:
     report: OptionalFile = None
     """An HTML page with the coefficients over time and the recovered light beside thumbnails."""
     render: bool = True
-    """Draw the object and write the relit video; --no-render only estimates pose and lighting, without OpenGL."""
+    """Draw the object and write the relit video; --no-render only estimates pose and lighting."""
     preset: PresetName = "balanced"
     """Speed against accuracy: what the options below are by default."""
     budget: tyro.conf.OmitArgPrefixes[BudgetOptions] = field(default_factory=BudgetOptions)
