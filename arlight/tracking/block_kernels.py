@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.errors import CameraError
 from arlight.native import Workspace, library
 from arlight.tracking.block_layout import BlockLayout
 from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 from arlight.tracking.decoding import Decoding
 from arlight.tracking.lens import camera_parameters
+from arlight.video.conversion import Plane
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import PixelFormat
 
@@ -27,9 +29,9 @@ _SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
 _PATTERNED, _WHITE, _WANTED = 1, 2, 4
 _RESULTS = (("values", ROWS * 3), ("covariance", ROWS * ROWS), ("variance", 3), ("shading", 3), ("cycles", 2),
             ("phasor", 2), ("cosine", 1), ("trust", 1))  # fmt: skip
-_MOST_ROUNDS = 40
+_ROUNDS = (*range(9), 12, 16, 24, 32, 40)
 _STRAIGHT = 1e-6
-"""How far a ray may still move when the lens's distortion counts as undone."""
+"""How far rays of undistorted pixels may be off: a thousandth of a pixel."""
 
 
 class _Shared(Workspace):
@@ -49,7 +51,7 @@ class _Shared(Workspace):
         *((name, ctypes.c_void_p) for name in ("surfaces", "look")),
         *((name, ctypes.c_int64) for name in ("limit", "room")),
         *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "places", "codes", "lists", "hue", "tints")),
-        *((name, ctypes.c_void_p) for name in ("mean_code", "ceiling", "sums", "gathered")),
+        *((name, ctypes.c_void_p) for name in ("mean_code", "sums", "gathered")),
         ("planes", ctypes.c_void_p * 3),
         ("stride", ctypes.c_int64 * 3),
         *((name, ctypes.c_int64) for name in ("bytes", "shift_x", "shift_y")),
@@ -74,7 +76,7 @@ class BlockKernels:
         self._count = count = len(layout.half_mm)
         self._layout = layout
         n = -(-count // _LANES) * _LANES
-        width, height = camera.image_size
+        self._size = width, height = camera.image_size
         room = (min(samples, width * height) + 2 * _STEP + _LINE - 1) // _LINE * _LINE
         self.flags = np.zeros(n, np.uint8)
         self.pose = np.zeros(12)
@@ -110,7 +112,6 @@ class BlockKernels:
                 "hue": self.hue,
                 "tints": np.zeros((n, 3, _TINT), np.float32),
                 "mean_code": self.mean_code,
-                "ceiling": np.zeros((n, 3), np.float32),
                 "sums": np.zeros((n, _SUMS), np.float32),
                 "gathered": self.gathered,
             }
@@ -121,10 +122,11 @@ class BlockKernels:
         shared.reach_mm, shared.glass_mm = layout.slab.max_offset_mm, layout.slab.glass_mm
         shared.index = layout.slab.refractive_index
         shared.limit, shared.room = samples, room
-        shared.rounds = _rounds(camera)
         self._at = ctypes.byref(shared)
         self._format: PixelFormat | None = None
-        self._survey, self._measure = _functions()
+        self._curve: Decoding | None = None
+        self._survey, self._measure, self._undistort = _functions()
+        shared.rounds = self._rounds(camera)
 
     def place(self, pose: Pose, edge_px: float, blocks: NDArray[np.bool_] | None) -> None:
         """Say where the sheet is and which of its blocks are wanted."""
@@ -137,18 +139,25 @@ class BlockKernels:
             self.flags[: self._count][~np.asarray(blocks, bool)] &= ~np.uint8(_WANTED)
 
     def show(self, frame: Frame, curve: Decoding) -> None:
-        """Say what to measure on."""
+        """Say what to measure on, and what its codes stand for.
+
+        Raises:
+            CameraError: the frame's size is not the camera's.
+        """
+        if frame.size != self._size:
+            raise CameraError(
+                f"the frame has {frame.size} pixels, the camera {self._size}; give the camera that filmed it"
+            )
         shared = self._shared
-        if frame.format != self._format:
+        if frame.format is not self._format:
             self._format = frame.format
             _describe(shared, frame.format)
-        shared.hold({"light": curve.light, "encoding": curve.codes})
-        shared.entries, shared.clip = len(curve.light), curve.clip
-        for c in range(3):
-            plane = frame.planes[c if c < len(frame.planes) else 0]
-            if plane.strides[1] != plane.itemsize or plane.strides[0] < 0:
-                plane = np.ascontiguousarray(plane)
-            shared.__dict__["held"][f"plane {c}"] = plane
+        if curve is not self._curve:
+            self._curve = curve
+            shared.hold({"light": curve.light, "encoding": curve.codes})
+            shared.entries, shared.clip = len(curve.light), curve.clip
+        self._planes = [_readable(plane) for plane in (*frame.planes, *2 * frame.planes[:1])[:3]]
+        for c, plane in enumerate(self._planes):
             shared.planes[c] = plane.ctypes.data
             shared.stride[c] = plane.strides[0]
 
@@ -188,6 +197,24 @@ class BlockKernels:
             color_trust=parts["trust"],
         )
 
+    def rays(self, pixels: Array, rounds: int) -> Array:
+        """Rays (n, 2) of pixels (n, 2), the distortion undone in so many rounds; n is a multiple of 16."""
+        columns = np.ascontiguousarray(pixels.T, np.float32)
+        rays = np.empty_like(columns)
+        self._undistort(self._at, rounds, len(pixels), columns.ctypes.data, rays.ctypes.data)
+        return rays.T.astype(float)
+
+    def _rounds(self, camera: Camera) -> int:
+        """The fewest rounds that undo the distortion all over the picture."""
+        width, height = camera.image_size
+        across, down = np.meshgrid(np.linspace(0.0, width - 1.0, 16), np.linspace(0.0, height - 1.0, 16))
+        pixels = np.stack([across.ravel(), down.ravel()], axis=1)
+        exact = camera.rays(pixels)
+        for rounds in _ROUNDS:
+            if np.abs(self.rays(pixels, rounds) - exact).max() < _STRAIGHT:
+                return rounds
+        return _ROUNDS[-1]
+
     def _results(self) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
         """Fresh memory for what is measured."""
         n = len(self.flags)
@@ -201,6 +228,11 @@ class BlockKernels:
         self._shared.samples = counts.ctypes.data + 8 * n
         self._shared.valid = valid.ctypes.data
         return results, counts, valid
+
+
+def _readable(plane: Plane) -> Plane:
+    """A plane whose codes stand side by side, row below row."""
+    return plane if plane.strides[1] == plane.itemsize and plane.strides[0] > 0 else plane.copy()
 
 
 def _aligned(shape: tuple[int, int]) -> NDArray[np.float32]:
@@ -233,19 +265,12 @@ def _describe(shared: _Shared, format_: PixelFormat) -> None:
     ]
 
 
-def _rounds(camera: Camera) -> int:
-    """How often the compiled code must undo the distortion, all over the picture."""
-    width, height = camera.image_size
-    x, y = np.meshgrid(np.linspace(0.0, width - 1.0, 9), np.linspace(0.0, height - 1.0, 9))
-    pixels = np.stack([x, y], axis=-1).reshape(-1, 2)
-    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = camera_parameters(camera)[4:16]
-    pinhole = Camera(camera.image_size, camera.camera_matrix, np.zeros(5))
-    return 0 if not np.any(camera.distortion) else 5
-
-
 @cache
 def _functions():
     compiled = library(__file__, "blocks")
-    for function in (compiled.survey_blocks, compiled.measure_blocks):
+    for function in (compiled.survey_blocks, compiled.measure_blocks, compiled.undistort_pixels):
         function.argtypes, function.restype = [ctypes.c_void_p], None
-    return compiled.survey_blocks, compiled.measure_blocks
+    compiled.undistort_pixels.argtypes = [
+        ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p,
+    ]  # fmt: skip
+    return compiled.survey_blocks, compiled.measure_blocks, compiled.undistort_pixels

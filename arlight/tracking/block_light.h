@@ -132,26 +132,4 @@ static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
     return p;
 }
 
-/* Leaves out the pixels that are brighter than the ceiling in any channel. */
-static void leave_out(Pixels *p, int64_t room, const float ceiling[CHANNELS])
-{
-    int kept = 0;
-    for (int i = 0; i < p->total; i++) {
-        int used = 1;
-        for (int c = 0; c < CHANNELS; c++)
-            used &= p->light[c * room + i] <= ceiling[c];
-        p->cosine[kept] = p->cosine[i], p->sine[kept] = p->sine[i];
-        p->x[kept] = p->x[i], p->y[kept] = p->y[i];
-        for (int c = 0; c < CHANNELS; c++)
-            p->light[c * room + kept] = p->light[c * room + i];
-        kept += used;
-    }
-    p->total = kept;
-    float *lists[4] = {p->cosine, p->sine, p->x, p->y};
-    for (int k = 0; k < 4; k++)
-        clear_rest(lists[k], kept);
-    for (int c = 0; c < CHANNELS; c++)
-        clear_rest(p->light + c * room, kept);
-}
-
 #endif

@@ -2,10 +2,11 @@
 #ifndef ARLIGHT_BLOCKS_H
 #define ARLIGHT_BLOCKS_H
 
+#include <string.h>
+
 #include "native.h"
 
-#define LANES 16 /* blocks that are worked on together; n is a whole number of them, those added are never wanted */
-#define STEP 8   /* pixels are worked on in multiples of these; lists of them have room for as many more */
+#define STEP 8 /* pixels are worked on in multiples of these; lists of them have room for as many more */
 
 enum { HARMONICS = 3, ROWS = 2 * HARMONICS + 1, CHANNELS = 3 };
 enum { PATTERNED = 1, WHITE = 2, WANTED = 4 };    /* flags of a block */
@@ -30,7 +31,7 @@ typedef struct {
 } Sums;
 
 typedef struct {
-    int64_t blocks;                   /* n */
+    int64_t blocks;                   /* n, whole LANES; those that are too many are not wanted */
     int64_t width, height;            /* of the picture [px] */
     const double *lens;               /* (25) as `lens_of` reads them */
     const double *upright;            /* (9) inverse of the sensor's tilt, row by row */
@@ -59,11 +60,10 @@ typedef struct {
     float *rows;           /* (height, TERMS) coefficients in each row; also limits (2, height) */
     int32_t *places;       /* (CHANNELS, room) */
     char *codes;           /* (CHANNELS, room) of 2 bytes at most */
-    float *lists;          /* (33, room) */
+    float *lists;          /* (LISTS + COLUMNS + CHANNELS + 4, room) */
     float *hue;            /* (n, HUES, HUE) of Cb and Cr; most luma that chroma is scaled with, and least over most */
     Tint *tints;           /* (n, CHANNELS) */
     double *mean_code;     /* (n, 3) mean luma and chroma where chroma is shared */
-    float *ceiling;        /* (n, CHANNELS) light beyond which a pixel is left out */
     Sums *sums;            /* (n) by place in the order */
     int32_t *gathered;     /* (n) */
 

@@ -26,4 +26,20 @@ INLINE void straighten(const Lens *lens, float u, float v, float *x, float *y)
     *y = (v - dy) * radial;
 }
 
+#define LANES 16 /* that are worked on together */
+
+/* Rays (x, y, 1) of LANES pixels. */
+INLINE void undistort(const Lens *lens, const float *upright, int64_t rounds, const float *restrict px,
+                      const float *restrict py, float *restrict x, float *restrict y)
+{
+    float bent_x[LANES], bent_y[LANES];
+    for (int l = 0; l < LANES; l++) {
+        untilted(lens, upright, px[l], py[l], bent_x + l, bent_y + l);
+        x[l] = bent_x[l], y[l] = bent_y[l];
+    }
+    for (int64_t round = 0; round < rounds; round++)
+        for (int l = 0; l < LANES; l++)
+            straighten(lens, bent_x[l], bent_y[l], x + l, y + l);
+}
+
 #endif
