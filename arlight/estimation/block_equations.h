@@ -8,12 +8,14 @@
    and of the values with columns and field. A field of 1 is mirrored as strongly as `face` says. */
 enum { WITH_MIRROR = 6, MIRROR_SQUARE = 9, VALUES = 10, VALUES_MIRROR = 13 };
 
+#define SINGULAR 1e-12 /* what is left of a variance given other rows, relative to it, at least */
+
 /* Inverse of four covariance matrices, lower triangles in place: factors L D L', without roots, which take long. */
 INLINE void invert(lanes *a)
 {
     lanes reciprocal[ROWS];
     for (int r = 0; r < ROWS; r++) {
-        lanes scaled[ROWS], pivot = a[PAIR[r][r]];
+        lanes scaled[ROWS], diagonal = a[PAIR[r][r]], pivot = diagonal;
         for (int s = 0; s < r; s++) {
             scaled[s] = a[PAIR[r][s]];
             for (int k = 0; k < s; k++)
@@ -21,7 +23,7 @@ INLINE void invert(lanes *a)
             a[PAIR[r][s]] = scaled[s] * reciprocal[s];
             pivot -= scaled[s] * a[PAIR[r][s]];
         }
-        reciprocal[r] = 1.0 / pivot;
+        reciprocal[r] = 1.0 / larger(pivot, SINGULAR * diagonal);
     }
     /* the factor's inverse, below a diagonal of ones */
     for (int s = 0; s < ROWS; s++)

@@ -46,6 +46,7 @@ typedef struct {
     double *shared;         /* (row, row) equations of the shared unknowns */
     double *stacked;        /* (stride, row) rows whose products they are */
     double *frequency;      /* (frequencies + 1, FREQUENCY) what each frequency's own equations leave */
+    double *least;          /* (row) prior precision of the shared unknowns */
     double *expected;       /* (2k - 1) prior mean */
     double *certain;        /* (2k - 1) prior precision */
     double *solution;       /* (row) of the shared unknowns */

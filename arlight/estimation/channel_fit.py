@@ -45,7 +45,7 @@ class _ChannelFit(Workspace):
         *((name, ctypes.c_void_p) for name in ("nuisances", "scales", "spreads", "lamps", "weights")),
         *((name, ctypes.c_void_p) for name in ("nuisance", "scale", "lamp", "weight", "packed", "covariance")),
         *((name, ctypes.c_void_p) for name in ("reflection", "predicted", "planes", "shared", "stacked")),
-        *((name, ctypes.c_void_p) for name in ("frequency", "expected", "certain", "solution", "carried")),
+        *((name, ctypes.c_void_p) for name in ("frequency", "least", "expected", "certain", "solution", "carried")),
         *((name, ctypes.c_void_p) for name in ("carried_light", "fields", "certainty", "products", "small")),
         *((name, ctypes.c_double) for name in ("chi2", "unexplained")),
     )
@@ -147,7 +147,7 @@ class SheetFit:
         shapes = {
             "planes": (_PLANES, stride), "shared": (width, width), "stacked": (stride + 8, width),
             "frequency": (len(self._frequencies) + 1, _FREQUENCY),
-            "expected": (wide,), "certain": (wide,), "solution": (width,), "carried": (width, _WIDE),
+            "least": (width,), "expected": (wide,), "certain": (wide,), "solution": (width,), "carried": (width, _WIDE),
             "carried_light": (wide + 1, _WIDE), "fields": (width, stride), "certainty": (width + 8, wide),
             "products": (wide, wide), "small": (most + 8, most + 8),
         }  # fmt: skip

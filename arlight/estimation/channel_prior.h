@@ -46,14 +46,14 @@ static void expect_pattern(const ChannelFit *f)
     const MeasuredBlocks *m = f->m;
     const double *green = f->reflection + GREEN * m->stride;
     double *pattern = f->basis_planes + m->stride, sum = 0.0, squares = 0.0;
-    for (int64_t i = 0; i < m->blocks; i++)
+    for (int64_t i = 0; i < m->blocks && f->channel != GREEN; i++)
         sum += green[i];
     const double mean = sum / (double)m->blocks;
-    for (int64_t i = 0; i < m->blocks; i++)
+    for (int64_t i = 0; i < m->blocks && f->channel != GREEN; i++)
         squares += (green[i] - mean) * (green[i] - mean);
-    const double scale = f->channel == GREEN ? 0.0 : 1.0 / fmax(sqrt(squares / (double)m->blocks), 1e-6);
+    const double scale = 1.0 / fmax(sqrt(squares / (double)m->blocks), 1e-6);
     for (int64_t i = 0; i < m->blocks; i++)
-        f->basis[i * f->row + 1] = pattern[i] = scale * green[i] / m->face[i];
+        f->basis[i * f->row + 1] = pattern[i] = f->channel == GREEN ? 0.0 : scale * green[i] / m->face[i];
 }
 
 /* Usual variance of what a block mirrors by itself beside the field, a part of the means' errors. */

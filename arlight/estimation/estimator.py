@@ -151,8 +151,10 @@ class LightingEstimator:
         return stripes, reflection
 
     def _learnt(self) -> Nuisance:
-        """Where the next frame starts."""
+        """Where the next frame starts: anew where this one made no sense."""
         fit = self._fit
+        if not np.all(np.isfinite(fit.packed)):
+            return Nuisance()
         blocks = np.empty((2, len(fit.lamps[GREEN])))
         np.multiply(fit.lamps[GREEN], 1.0 / self._measured.white[GREEN] ** 2, out=blocks[0])
         blocks[1] = fit.weights[GREEN]
@@ -179,5 +181,6 @@ class LightingEstimator:
 
 
 def _shape(green: Array) -> Array:
-    """Real-packed coefficients relative to L~_0."""
-    return green / max(float(green[0]), 1e-6)
+    """Real-packed coefficients relative to L~_0; light is not negative, so none can be larger."""
+    shape: Array = np.clip(green / max(float(green[0]), 1e-6), -1.0, 1.0)
+    return shape

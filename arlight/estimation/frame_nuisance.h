@@ -92,6 +92,8 @@ static HOT void eliminate_slopes(const ChannelFit *f, int64_t g, double *mean, S
     const int64_t from = f->first[g], n = f->first[g + 1] - from, stride = f->m->stride;
     const double *own = of_frequency(f, g), *mirror = plane(f, GRAM + WITH_MIRROR + 1) + from;
     double column[NUISANCES][2], solved[NUISANCES][2];
+    for (int k = NUISANCES; k < WIDE; k++)
+        f->carried_light[(2 * g - 1) * WIDE + k] = f->carried_light[2 * g * WIDE + k] = 0.0;
     for (int k = 0; k < NUISANCES; k++) {
         const double *real = plane(f, CROSS + NUISANCES + k) + from, *imaginary = real + NUISANCES * stride;
         double *field = plane(f, CROSS + COLUMNS * NUISANCES + k) + from, x = 0.0, y = 0.0;
@@ -192,17 +194,19 @@ static HOT void carry(const ChannelFit *f, Step *s)
 static void gauss_newton(const ChannelFit *f, Step *s)
 {
     double factor[NUISANCES][NUISANCES] = {{0.0}}, *inverse = &s->doubt[0][0], moved[NUISANCES];
+    double prior[NUISANCES];
     int told = 0;
     for (int k = 0; k < NUISANCES * NUISANCES; k++)
         inverse[k] = 0.0;
     for (int k = 0; k < NUISANCES; k++) {
         told |= s->information[k][k] > 0.0;
+        prior[k] = 1.0 / (PRIOR_SPREAD[k] * PRIOR_SPREAD[k]);
         s->step[k] = 0.0;
         for (int l = 0; l <= k; l++) {
-            double sum = s->information[k][l] + (k == l ? 1.0 / (PRIOR_SPREAD[k] * PRIOR_SPREAD[k]) : 0.0);
+            double sum = s->information[k][l] + (k == l ? prior[k] : 0.0);
             for (int i = 0; i < l; i++)
                 sum -= factor[k][i] * factor[l][i];
-            factor[k][l] = k == l ? sqrt(sum) : sum / factor[l][l];
+            factor[k][l] = k == l ? sqrt(fmax(sum, prior[k])) : sum / factor[l][l];
         }
     }
     for (int l = 0; l < NUISANCES; l++)
@@ -217,7 +221,7 @@ static void gauss_newton(const ChannelFit *f, Step *s)
     for (int k = 0; k < NUISANCES; k++) {
         moved[k] = 0.0;
         for (int l = 0; l <= k; l++) {
-            double pull = (USUAL[l] - f->nuisance[l]) / (PRIOR_SPREAD[l] * PRIOR_SPREAD[l]);
+            double pull = (USUAL[l] - f->nuisance[l]) * prior[l];
             moved[k] += s->doubt[k][l] * (s->right[l] + pull);
         }
     }

@@ -10,6 +10,8 @@
 #include "block_equations.h"
 #include "symmetric.h"
 
+#define ROUNDING 1e-13 /* what is left of a number after it was taken off, relative to it, counts as nothing */
+
 INLINE double gram(const ChannelFit *f, int64_t number, int64_t block) { return plane(f, GRAM + number)[block]; }
 
 INLINE double *of_frequency(const ChannelFit *f, int64_t g) { return f->frequency + g * FREQUENCY; }
@@ -28,10 +30,12 @@ INLINE void solve_frequency(const ChannelFit *f, int64_t g)
         values[0] += gram(f, VALUES + 1, i);
         values[1] += gram(f, VALUES + 2, i);
     }
-    double determinant = a * c - b * b;
-    own[INVERSE] = c / determinant;
-    own[INVERSE + 1] = -b / determinant;
-    own[INVERSE + 2] = a / determinant;
+    /* nothing is less certain than before anything was measured, whatever rounding left */
+    a = fmax(a, f->certain[2 * g - 1]);
+    double share = b / a, rest = 1.0 / fmax(c - share * b, f->certain[2 * g]);
+    own[INVERSE] = 1.0 / a + share * share * rest;
+    own[INVERSE + 1] = -share * rest;
+    own[INVERSE + 2] = rest;
     for (int k = 0; k < 2; k++) {
         own[WITH_MEAN + k] = mean[k];
         own[WITH_VALUES + k] = values[k];
@@ -73,13 +77,13 @@ INLINE void reduce_group(const ChannelFit *f, int64_t from, int64_t n, const dou
     }
 }
 
-/* Replaces a group's equations by the rows of their factor, as far as field values go; where a block says nothing its
-   row is 0. */
-INLINE void factorise_group(int64_t n, double *k)
+/* Replaces a group's equations by the rows of their factor, as far as field values go; where a block says nothing that
+   its frequency and the blocks before it do not say, its row is 0. `square` are the equations' diagonal at first. */
+INLINE void factorise_group(int64_t n, const double *square, double *k)
 {
     int64_t w = n + 2;
     for (int64_t i = 0; i < n; i++) {
-        double pivot = k[i * w + i], reciprocal = pivot > 0.0 ? 1.0 / sqrt(pivot) : 0.0;
+        double pivot = k[i * w + i], reciprocal = pivot > ROUNDING * fabs(square[i]) ? 1.0 / sqrt(pivot) : 0.0;
         for (int64_t j = i; j < w; j++)
             k[i * w + j] *= reciprocal;
         for (int64_t j = i + 1; j <= n; j++)
@@ -95,7 +99,7 @@ static HOT void stack_group(const ChannelFit *f, int64_t from, int64_t n, const 
     double *k = f->small, *mean = f->shared + f->field * f->width + f->field;
     int64_t w = n + 2;
     reduce_group(f, from, n, own, k);
-    factorise_group(n, k);
+    factorise_group(n, plane(f, GRAM + MIRROR_SQUARE) + from, k);
     for (int64_t c = 0; c < f->width; c += LANES) {
         const double *fields = f->basis + from * f->row + c;
         for (int64_t i = 0; i < n; i++) {
@@ -122,9 +126,9 @@ static void start_shared(const ChannelFit *f)
     /* the mean reflection and red's and blue's share of green's pattern may be anything up to white */
     for (int64_t i = 0; i < f->field; i++) {
         double deviation = i <= 1 ? white : amplitude;
-        f->shared[i * (f->width + 1)] = 1.0 / (deviation * deviation);
+        f->shared[i * (f->width + 1)] = f->least[i] = 1.0 / (deviation * deviation);
     }
-    f->shared[f->field * (f->width + 1)] = f->certain[0];
+    f->shared[f->field * (f->width + 1)] = f->least[f->field] = f->certain[0];
     f->shared[f->field * (f->width + 1) + 1] = f->certain[0] * f->expected[0];
 }
 
@@ -181,7 +185,7 @@ static HOT void solve_shared(const ChannelFit *f, double *packed)
         stack_group(f, from, f->first[g + 1] - from, of_frequency(f, g), f->stacked + from * f->width);
     }
     add_products(f->m->blocks, f->width, f->stacked, f->width, 1.0, f->shared, f->width);
-    factorise(pivots, f->width, f->shared, f->width);
+    factorise(pivots, f->width, f->shared, f->width, f->least);
     for (int64_t k = 0; k < f->width; k++)
         f->solution[k] = 0.0;
     for (int64_t k = pivots - 1; k >= 0; k--) {

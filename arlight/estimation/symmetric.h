@@ -47,8 +47,9 @@ static HOT void add_products(int64_t terms, int64_t size, const double *a, int64
 }
 
 /* Replaces the first `pivots` rows of a positive definite matrix by R with R'R the matrix; columns beyond, such as a
-   right-hand side, are substituted. size >= pivots is a multiple of four. */
-static HOT void factorise(int64_t pivots, int64_t size, double *s, int64_t stride)
+   right-hand side, are substituted. size >= pivots is a multiple of four. Pivots are `least` (pivots) at least, as those
+   of a matrix to which a diagonal was added. */
+static HOT void factorise(int64_t pivots, int64_t size, double *s, int64_t stride, const double *least)
 {
     for (int64_t k = 0; k < pivots; k += LANES) {
         int64_t rows = pivots - k < LANES ? pivots - k : LANES;
@@ -60,7 +61,7 @@ static HOT void factorise(int64_t pivots, int64_t size, double *s, int64_t strid
                 for (int64_t j = k; j < size; j += LANES)
                     store(row + j, load(row + j) - factor * load(above + j));
             }
-            lanes reciprocal = splat(1.0 / sqrt(row[k + p]));
+            lanes reciprocal = splat(1.0 / sqrt(fmax(row[k + p], least[k + p])));
             for (int64_t j = k; j < size; j += LANES)
                 store(row + j, load(row + j) * reciprocal);
         }

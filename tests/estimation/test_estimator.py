@@ -282,3 +282,18 @@ def test_more_iterations_change_little_once_a_clip_has_begun(probe, blank, lit, 
             squares.append(relative_error(estimate, truth) ** 2)
         errors.append(np.sqrt(np.mean(squares[2:])))
     assert errors[0] < 1.1 * errors[1]
+
+
+def test_a_frame_of_nonsense_does_not_spoil_the_next(estimator, blank, lit, random_light):
+    truth = random_light(24)
+    good, spoilt = lit(blank(), truth), lit(blank(), truth)
+    spoilt.values[7] = np.nan
+    nuisance = estimator.estimate(spoilt, 0.0, settled(estimator, good, 3).nuisance).nuisance
+    after = estimator.estimate(good, 0.0, nuisance)
+    assert relative_error(after, truth).max() < 0.01
+    wild = replace(good, values=1e3 * np.random.default_rng(1).normal(size=good.values.shape))
+    for _ in range(4):
+        estimate = estimator.estimate(wild, 0.0, nuisance)
+        nuisance = estimate.nuisance
+        assert np.all(np.isfinite(estimate.lighting.covariance))
+    assert relative_error(settled(estimator, good, 4), truth).max() < 0.01
