@@ -47,8 +47,8 @@ static HOT void add_products(int64_t terms, int64_t size, const double *a, int64
 }
 
 /* Replaces the first `pivots` rows of a positive definite matrix by R with R'R the matrix; columns beyond, such as a
-   right-hand side, are substituted. size >= pivots is a multiple of four. Pivots are `least` (pivots) at least, as those
-   of a matrix to which a diagonal was added. */
+   right-hand side, are substituted. size >= pivots is a multiple of four. Pivots are `least` (pivots) at least, as
+   those of a matrix to which a diagonal was added. */
 static HOT void factorise(int64_t pivots, int64_t size, double *s, int64_t stride, const double *least)
 {
     for (int64_t k = 0; k < pivots; k += LANES) {
