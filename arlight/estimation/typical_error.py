@@ -1,9 +1,9 @@
 """The covariance that the frames' errors typically have, and what follows from how they correlate.
 
 A frame's estimate errs along some combinations of coefficients more than along others, and which ones changes with the
-view. The filter follows every coefficient by itself and leaves correlations to this: an innovation is first divided by
-how the frame's errors correlate, then multiplied by how those of all the frames before do. With one gain for all
-coefficients that is the Kalman filter of the whole vector, P (P + R)^-1, whose P keeps the typical correlations.
+view. The filter follows every coefficient by itself, with its own variance; how a memory's errors correlate is taken
+from the frames before. With variances and correlations the innovations are those of the Kalman filter of the whole
+vector, P (P + R)^-1, which take no direction more than wholly, however the frames' covariances change.
 """
 
 import ctypes
@@ -37,7 +37,7 @@ class _Shared(Workspace):
         *((name, ctypes.c_void_p) for name in ("covariance", "diagonal", "frame")),
         ("many", ctypes.c_int64),
         ("memories", ctypes.POINTER(ctypes.c_void_p)),
-        *((name, ctypes.c_void_p) for name in ("innovation", "terms", "factor", "sides")),
+        *((name, ctypes.c_void_p) for name in ("innovation", "terms", "factor", "sides", "shares")),
     )
 
 
@@ -47,7 +47,7 @@ class TypicalError:
     Args:
         memory_s: time over which covariances are averaged [s].
         frame: the relative light of the frames, which is taken anew for each.
-        memories: whose innovations are weighed; the first one's gain counts for all.
+        memories: whose innovations are weighed.
     """
 
     def __init__(self, memory_s: float, frame: RelativeLight, memories: tuple[FadingMemory, ...]) -> None:
@@ -73,7 +73,8 @@ class TypicalError:
                 "innovation": self._innovation,
                 "terms": np.zeros((4, size)),
                 "factor": np.zeros((stride, stride), np.float32),
-                "sides": np.zeros((2, len(memories) + 1, stride), np.float32),
+                "sides": np.zeros((2, stride), np.float32),
+                "shares": np.zeros((3, size)),
             }
         )
         self._at = ctypes.byref(self.shared)
