@@ -50,22 +50,19 @@ static HOT float sum_list(int total, const float *restrict values, float *least)
 /* Sums over the cells of one block: values Cb, Cr and the mean of their luma, as far as chroma is scaled with it. */
 static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
-    Span span = span_of(b, block, grid);
-    if (span.total > b->limit / 2)
-        thin_out(b, &span, (int)(b->limit / 2));
-    list_points(b, block, grid, &span, CELLS);
+    int total = list_points(b, block, grid, (int)b->limit / 2, CELLS);
     float *c = list_of(b, PHASE_LIST), *s = list_of(b, SINE_LIST), *values = list_of(b, CODE_LIST);
     float *luma = list_of(b, LIGHT_LIST);
-    turn_all(span.total, c, s);
+    turn_all(total, c, s);
     if (limited)
-        limit_luma(b->harmonics[block], span.total, limit_of(b, block), luma, c, s, values + 2 * b->room);
+        limit_luma(b->harmonics[block], total, limit_of(b, block), luma, c, s, values + 2 * b->room);
     else
-        memcpy(values + 2 * b->room, luma, (size_t)span.total * sizeof *luma);
+        memcpy(values + 2 * b->room, luma, (size_t)total * sizeof *luma);
     for (int k = PHASE_LIST; k <= LIGHT_LIST; k++)
-        clear_rest(list_of(b, k), span.total);
-    sum_block(b->harmonics[block] > 0, span.total, c, s, list_of(b, X_LIST), list_of(b, Y_LIST), values, b->room, sums);
-    double over = span.total ? 1.0 / span.total : 0.0;
-    chroma->mean[0] = sum_list(span.total, luma, &chroma->darkest) * over;
+        clear_rest(list_of(b, k), total);
+    sum_block(b->harmonics[block] > 0, total, c, s, list_of(b, X_LIST), list_of(b, Y_LIST), values, b->room, sums);
+    double over = total ? 1.0 / total : 0.0;
+    chroma->mean[0] = sum_list(total, luma, &chroma->darkest) * over;
     chroma->mean[1] = sums->right[0][0] * over;
     chroma->mean[2] = sums->right[1][0] * over;
 }

@@ -115,11 +115,9 @@ static HOT void prepare_pixels(const Blocks *b, int block, const Pixels *p)
 /* Lists the pixels of a block and their light. */
 static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
 {
-    Span span = span_of(b, block, grid);
-    if (span.total > b->limit)
-        thin_out(b, &span, (int)b->limit);
-    list_points(b, block, grid, &span, b->shift_x > 0 || b->shift_y > 0 ? LUMA : ALL_PLANES);
-    Pixels p = {span.total, {0}, list_of(b, PHASE_LIST), list_of(b, SINE_LIST), list_of(b, X_LIST),
+    int what = b->shift_x > 0 || b->shift_y > 0 ? LUMA : ALL_PLANES;
+    int total = list_points(b, block, grid, (int)b->limit, what);
+    Pixels p = {total, {0}, list_of(b, PHASE_LIST), list_of(b, SINE_LIST), list_of(b, X_LIST),
                 list_of(b, Y_LIST), list_of(b, LIGHT_LIST)};
     prepare_pixels(b, block, &p);
     for (int c = 0; c < CHANNELS; c++) {

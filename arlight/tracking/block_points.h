@@ -12,11 +12,6 @@ INLINE float *list_of(const Blocks *b, int which)
     return b->lists + which * b->room;
 }
 
-INLINE int whole_steps(int count)
-{
-    return (count + STEP - 1) & -STEP;
-}
-
 /* Some neighbours in a list, and their columns. */
 typedef float Vector __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
 typedef int32_t Columns __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
@@ -35,18 +30,19 @@ typedef struct {
     int64_t stride[CHANNELS];   /* bytes from row to row of the grid */
     int64_t luma_stride;        /* bytes from row to row of pixels */
     int bytes, across, down;    /* of a code; pixels that share chroma */
-    int last;                   /* column */
+    int width, height;          /* cells */
+    int together;               /* whether a step can be read at once, but for the last row */
     float left, step;           /* u of the first column, and from one to the next */
     float *phase, *x, *y, *luma; /* luma: the sum over a cell */
     char *codes[CHANNELS];
 } Reader;
 
-/* One row of cells. */
+/* Neighbours in a row, a step at most. */
 typedef struct {
     int row, left, count; /* in the plane */
     int at;               /* place in the lists */
     const float *terms;   /* (SURFACES, CUBIC) coefficients of u^k */
-} Row;
+} Cells;
 
 /* Phase, x and y at some columns; their cubic part matters for the phase alone. */
 INLINE void place(const Reader *s, const float *k, Vector u, int at)
@@ -67,24 +63,19 @@ INLINE Columns sum_pairs(const char *from, int bytes)
     return (Columns)((pairs & 65535) + (pairs >> 16));
 }
 
-/* A row of neighbours, in whole steps: what is too much is written over by the next row. */
-INLINE void list_neighbours(const Reader *s, Row row, int what, int bytes, int down)
+/* Lists neighbours, a whole step: what is too much is written over by the next. */
+INLINE void list_step(const Reader *s, Cells cells, int what, int bytes, int down)
 {
-    const char *from[CHANNELS];
-    for (int plane = 0; plane < CHANNELS; plane++)
-        from[plane] = s->from[plane] + row.row * s->stride[plane] + row.left * bytes;
-    const char *pairs = from[0] + row.left * bytes;
-    Vector u = s->left + s->step * __builtin_convertvector(row.left + EACH, Vector);
-    for (int i = 0; i < row.count; i += STEP, u += s->step * STEP) {
-        place(s, row.terms, u, row.at + i);
-        for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-            memcpy(s->codes[plane] + (row.at + i) * bytes, from[plane] + i * bytes, (size_t)(STEP * bytes));
-        if (what == CELLS) {
-            Columns sum = sum_pairs(pairs + 2 * i * bytes, bytes);
-            if (down == 2)
-                sum += sum_pairs(pairs + 2 * i * bytes + s->luma_stride, bytes);
-            *(Vector *)(s->luma + row.at + i) = __builtin_convertvector(sum, Vector);
-        }
+    place(s, cells.terms, s->left + s->step * __builtin_convertvector(cells.left + EACH, Vector), cells.at);
+    for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+        memcpy(s->codes[plane] + cells.at * bytes, s->from[plane] + cells.row * s->stride[plane] + cells.left * bytes,
+               (size_t)(STEP * bytes));
+    if (what == CELLS) {
+        const char *from = s->from[0] + cells.row * s->stride[0] + 2 * cells.left * bytes;
+        Columns sum = sum_pairs(from, bytes);
+        if (down == 2)
+            sum += sum_pairs(from + s->luma_stride, bytes);
+        *(Vector *)(s->luma + cells.at) = __builtin_convertvector(sum, Vector);
     }
 }
 
@@ -93,37 +84,39 @@ INLINE int code_at(const char *row, int bytes, int64_t column)
     return bytes == 1 ? ((const uint8_t *)row)[column] : ((const uint16_t *)row)[column];
 }
 
-/* A row of any cells, one by one; columns: NULL for neighbours. */
-static void list_scattered(const Reader *s, Row row, const int32_t *columns, int what)
+/* The same where a whole step would leave the plane, and for cells of other shapes. */
+static void list_singly(const Reader *s, Cells cells, int what)
 {
-    const float *k = row.terms;
-    for (int i = 0; i < row.count; i++) {
-        int column = columns ? columns[i] : row.left + i, at = row.at + i, sum = 0;
-        column = column < s->last ? column : s->last;
+    const float *k = cells.terms;
+    for (int i = 0; i < cells.count; i++) {
+        int column = cells.left + i, at = cells.at + i, sum = 0;
         float u = s->left + s->step * (float)column;
         s->phase[at] = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
         s->x[at] = k[4] + u * (k[5] + u * k[6]);
         s->y[at] = k[8] + u * (k[9] + u * k[10]);
         for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-            memcpy(s->codes[plane] + at * s->bytes, s->from[plane] + row.row * s->stride[plane] + column * s->bytes,
+            memcpy(s->codes[plane] + at * s->bytes, s->from[plane] + cells.row * s->stride[plane] + column * s->bytes,
                    (size_t)s->bytes);
         for (int j = 0; j < s->down && what == CELLS; j++)
             for (int l = 0; l < s->across; l++)
-                sum += code_at(s->from[0] + row.row * s->stride[0] + j * s->luma_stride, s->bytes,
+                sum += code_at(s->from[0] + cells.row * s->stride[0] + j * s->luma_stride, s->bytes,
                                (int64_t)column * s->across + l);
         s->luma[at] = (float)sum;
     }
 }
 
-/* A row of neighbours; the usual ones have loops of their own. */
-INLINE void list_row(const Reader *s, Row row, int what)
+/* Lists neighbours; the usual ones have code of their own. */
+INLINE void list_some(const Reader *s, Cells cells, int what)
 {
-    if (what == CELLS && s->bytes == 1)
-        list_neighbours(s, row, CELLS, 1, s->down);
+    /* a whole step may run into the next row of the plane, not beyond the last */
+    if (!s->together || (cells.row + 1 == s->height && cells.left + STEP > s->width))
+        list_singly(s, cells, what);
+    else if (what == CELLS && s->bytes == 1)
+        list_step(s, cells, CELLS, 1, s->down);
     else if (what == LUMA && s->bytes == 1)
-        list_neighbours(s, row, LUMA, 1, 1);
+        list_step(s, cells, LUMA, 1, 1);
     else
-        list_neighbours(s, row, what, s->bytes, s->down);
+        list_step(s, cells, what, s->bytes, s->down);
 }
 
 static Reader reader_of(const Blocks *b, int block, int what, const Grid *grid)
@@ -131,10 +124,11 @@ static Reader reader_of(const Blocks *b, int block, int what, const Grid *grid)
     int cells = what == CELLS;
     float scale = 1.0f / b->box[2 * b->blocks + block];
     Reader s = {.luma_stride = b->stride[0], .bytes = (int)b->bytes, .across = cells ? (int)grid->step_x : 1,
-                .down = cells ? (int)grid->step_y : 1, .last = grid->width - 1,
+                .down = cells ? (int)grid->step_y : 1, .width = grid->width, .height = grid->height,
                 .left = (grid->first_x - b->box[block]) * scale, .step = grid->step_x * scale,
                 .phase = list_of(b, PHASE_LIST), .x = list_of(b, X_LIST), .y = list_of(b, Y_LIST),
                 .luma = list_of(b, LIGHT_LIST)};
+    s.together = grid->width >= 2 * STEP && (!cells || (s.across == 2 && s.down <= 2));
     for (int plane = 0; plane < CHANNELS; plane++) {
         s.from[plane] = b->planes[plane];
         s.stride[plane] = b->stride[plane] * (plane == 0 ? s.down : 1);
@@ -156,21 +150,32 @@ INLINE void expand_rows(const Blocks *b, int block, const Grid *grid, const Span
     }
 }
 
-/* Fills the lists of phase, x, y and of the planes' codes, for CELLS also that of their luma's sums. */
-static HOT void list_cells(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
+/* Fills the lists of phase, x, y and of the planes' codes, for CELLS also that of their luma's sums. Returns how many
+ * cells there are. */
+static HOT int list_cells(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
 {
     expand_rows(b, block, grid, span);
     Reader s = reader_of(b, block, what, grid);
-    const int32_t *columns = span->sparse ? b->places : NULL;
-    int together = !columns && grid->width >= 2 * STEP && (what != CELLS || (s.across == 2 && s.down <= 2));
-    for (int r = 0, at = 0; r < span->rows; at += span->count[r++]) {
-        Row row = {span->first_row + r, span->left[r], span->count[r], at, b->rows + r * TERMS};
-        /* whole steps may run into the next row of the plane, not beyond the last */
-        if (together && (row.row + 1 < grid->height || row.left + whole_steps(row.count) <= grid->width))
-            list_row(&s, row, what);
-        else
-            list_scattered(&s, row, columns ? columns + at : NULL, what);
+    Cells cells = {.at = 0};
+    for (int r = 0, first = 0, next = 0; r < span->rows; r++) {
+        int steps = whole_steps(span->count[r]) / STEP, left = span->left[r], end = left + span->count[r];
+        cells.row = span->first_row + r;
+        cells.terms = b->rows + r * TERMS;
+        for (int step = 0; step < steps; step++) {
+            if (span->chosen >= 0) {
+                if (next == span->chosen || span->steps[next] >= first + steps)
+                    break;
+                step = span->steps[next++] - first;
+            }
+            cells.left = left + step * STEP;
+            cells.count = end - cells.left < STEP ? end - cells.left : STEP;
+            cells.count = cells.count < span->total - cells.at ? cells.count : span->total - cells.at;
+            list_some(&s, cells, what);
+            cells.at += cells.count;
+        }
+        first += steps;
     }
+    return cells.at;
 }
 
 /* A list of codes as values. */
@@ -192,20 +197,25 @@ static HOT void convert_codes(const Blocks *b, int plane, int total, float *valu
         convert(total, codes, 2, offset, scale, values);
 }
 
-/* Lists the cells of a block and the planes' values; for CELLS Cb and Cr, and their mean luma in the list of light. */
-static HOT void list_points(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
+/* Lists the cells of a block and the planes' values; for CELLS Cb and Cr, and their mean luma in the list of light. Takes
+ * `limit` of them at most; returns how many there are. */
+static HOT int list_points(const Blocks *b, int block, const Grid *grid, int limit, int what)
 {
-    list_cells(b, block, grid, span, what);
+    Span span = span_of(b, block, grid);
+    if (span.total > limit)
+        thin_out(&span, limit);
+    int total = list_cells(b, block, grid, &span, what);
     float *values = list_of(b, CODE_LIST);
     for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-        convert_codes(b, plane, span->total, values + (plane - (what == CELLS)) * b->room);
+        convert_codes(b, plane, total, values + (plane - (what == CELLS)) * b->room);
     if (what != CELLS)
-        return;
+        return total;
     float *luma = list_of(b, LIGHT_LIST), scale = (float)b->scale[0] / (grid->step_x * grid->step_y);
     float offset = (float)(b->offset[0] * b->scale[0]);
-    int steps = whole_steps(span->total) & -STEP;
+    int steps = whole_steps(total) & -STEP;
     for (int i = 0; i < steps; i++)
         luma[i] = luma[i] * scale - offset;
+    return total;
 }
 
 /* Clears what stands behind the list up to a whole step. */

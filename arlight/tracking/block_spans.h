@@ -11,13 +11,19 @@ typedef struct {
     int width, height;      /* whole cells */
 } Grid;
 
-/* The cells of one block. left, count: first and number of each row's; start: of the row in the list. */
+/* The cells of one block. left, count: first and number of each row's. */
 typedef struct {
     int first_row, rows;
     int32_t *left, *count;
-    int total;    /* cells in the list */
-    int sparse;   /* columns of the list's cells stand in `columns`, otherwise they are all of a row's */
+    int total;       /* cells in the list */
+    int chosen;      /* of the rows' steps stand in `steps`, by number; -1 for all */
+    int32_t *steps;
 } Span;
+
+INLINE int whole_steps(int count)
+{
+    return (count + STEP - 1) & -STEP;
+}
 
 static Grid grid_of(const Blocks *b, int shared)
 {
@@ -81,7 +87,7 @@ static Span span_of(const Blocks *b, int block, const Grid *grid)
     int first = (int)ceilf((middle - half) / grid->step_y), last = (int)floorf((middle + half) / grid->step_y);
     first = first > 0 ? first : 0;
     last = last < grid->height - 1 ? last : grid->height - 1;
-    Span span = {first, last - first + 1, b->spans, b->spans + b->height, 0, 0};
+    Span span = {first, last - first + 1, b->spans, b->spans + b->height, 0, -1, b->places};
     if (span.rows <= 0) {
         span.rows = 0;
         return span;
@@ -93,30 +99,30 @@ static Span span_of(const Blocks *b, int block, const Grid *grid)
     return span;
 }
 
-/* Keeps at most `limit` cells: in each row one at random of every so many, because evenly spaced ones would alias the
- * stripes. The same cells of a picture are always chosen. */
-static HOT void thin_out(const Blocks *b, Span *span, int limit)
+/* A number from 0 to 1 that is always the same for the same place. */
+INLINE float chance(uint32_t place)
 {
-    int32_t *restrict columns = b->places;
-    double share = (double)limit / span->total, before = 0.0;
-    int at = 0;
-    for (int r = 0; r < span->rows; r++) {
-        int all = span->count[r], whole = (int)before;
-        before += share * all;
-        int kept = (int)before - whole;
-        float width = kept ? (float)all / (float)kept : 0.0f;
-        uint32_t row = (uint32_t)(span->first_row + r) * 73856093u;
-        for (int i = 0; i < kept; i++) {
-            int from = (int)((float)i * width), to = (int)((float)(i + 1) * width);
-            uint32_t chance = (row ^ (uint32_t)(span->left[r] + i) * 19349663u) * 2654435761u;
-            int pick = from + (int)((float)(chance >> 8) * 5.9604645e-8f * (float)(to - from));
-            columns[at + i] = span->left[r] + (pick < all ? pick : all - 1);
-        }
-        span->count[r] = kept;
-        at += kept;
+    place = (place ^ (place >> 16)) * 2146121005u;
+    place = (place ^ (place >> 15)) * 2221713035u;
+    return (float)(place >> 8) * 5.9604645e-8f;
+}
+
+/* Keeps at most `limit` cells: a few neighbours at random of every so many, in reading order, because evenly spaced ones
+ * would alias the stripes. */
+static HOT void thin_out(Span *span, int limit)
+{
+    int all = 0;
+    for (int r = 0; r < span->rows; r++)
+        all += whole_steps(span->count[r]) / STEP;
+    /* what is chosen may hold more cells than the average: the last ones are then cut */
+    int chosen = (int)((double)(limit - STEP / 2) / span->total * all);
+    float every = chosen > 0 ? (float)all / (float)chosen : 0.0f;
+    for (int i = 0; i < chosen; i++) {
+        int from = (int)((float)i * every), to = (int)((float)(i + 1) * every);
+        span->steps[i] = from + (int)(chance((uint32_t)i) * (float)(to - from));
     }
-    span->total = at;
-    span->sparse = 1;
+    span->chosen = chosen > 0 ? chosen : 0;
+    span->total = limit;
 }
 
 #endif
