@@ -183,7 +183,7 @@ def _record_line(record: LogRecord) -> str:
     fields = {
         "frame": str(record.frame),
         "time_s": _number(record.time_s),
-        "status": json.dumps(record.status),
+        "status": _quoted(record.status),
         "rvec": _numbers(None if pose is None else pose.rvec),
         "tvec": _numbers(None if pose is None else pose.translation),
         "reprojection_rms_px": _number(record.reprojection_rms_px),
@@ -224,7 +224,12 @@ def _record_from(content: dict[str, Any], count: int) -> LogRecord:
 
 
 def _object(fields: dict[str, str]) -> str:
-    return "{" + ",".join(f"{json.dumps(name)}:{value}" for name, value in fields.items()) + "}"
+    return "{" + ",".join(f"{_quoted(name)}:{value}" for name, value in fields.items()) + "}"
+
+
+@cache
+def _quoted(text: str) -> str:
+    return json.dumps(text)
 
 
 def _number(value: float) -> str:
