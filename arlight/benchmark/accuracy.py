@@ -17,6 +17,7 @@ from arlight.synthetic.settings import SynthesisSettings
 from arlight.synthetic.sheet import SheetLayers
 from arlight.synthetic.synthesis import SyntheticFrame, synthesize
 from arlight.synthetic.truth import ClipTruth
+from arlight.tracker_settings import TrackerSettings
 from arlight.tracking.blocks import BlockMeter
 
 
@@ -73,7 +74,7 @@ def accuracy_table(settings: AccuracySettings, probe: Probe) -> Iterator[Accurac
 
 def _measure(footage: SynthesisSettings, probe: Probe, layers: SheetLayers) -> AccuracyCell:
     camera = footage.filming_camera
-    tracker = LightingTracker(probe, camera)
+    tracker = LightingTracker(probe, camera, TrackerSettings(order="all"))
     header = LogHeader.of(probe, camera, "synthetic", "designed")
     filtered, single, truths, bounds = [], [], [], []
     bound = _FrameBound(probe, footage)

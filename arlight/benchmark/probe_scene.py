@@ -109,7 +109,7 @@ class ProbeScene:
 
     def estimate(self, photograph: Photograph) -> Lighting | None:
         """What the sheet tells of one picture; None where it is not seen."""
-        tracker = LightingTracker(self.probe, self.camera, TrackerSettings(filtered=False))
+        tracker = LightingTracker(self.probe, self.camera, TrackerSettings(order="all", filtered=False))
         return tracker.update(Frame.from_rgb(photograph.encoded)).raw
 
 

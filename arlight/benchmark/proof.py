@@ -39,7 +39,7 @@ class Treatment:
     """The sheet; None for exactly as designed."""
     camera: Camera
     """The camera, with the vignetting that is divided out."""
-    settings: TrackerSettings = field(default_factory=TrackerSettings)
+    settings: TrackerSettings = field(default_factory=lambda: TrackerSettings(order="all"))
     """Of the estimation."""
 
 

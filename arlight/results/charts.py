@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _MOST_POINTS = 400
 _BAND_SIGMAS = 2.0
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_STATUS_COLOURS = {"lost": "#d9534f", "coasting": "#f0ad4e", "tracked": "#5cb85c"}
+_STATUS_COLOURS = {"left out": "#b0b0b0", "lost": "#d9534f", "coasting": "#f0ad4e", "tracked": "#5cb85c"}
 _CHANNEL_COLOURS = ("#c0392b", "#27ae60", "#2980b9")
 
 
