@@ -215,10 +215,10 @@ def test_few_pixels_of_a_block_are_chosen_by_chance(camera, look):
         assert np.all(some.samples <= 150)
         busy = every.samples > 200
         assert np.all(some.samples[busy] > 100)
-        deviation = np.sqrt(some.covariance[busy, 0, 0] * every.pixel_variance[busy, 0])
+        # eight neighbours in a row may all be alike, and are seen from nearly the same direction
+        deviation = np.sqrt(8.0 * some.covariance[busy, 0, 0] * every.pixel_variance[busy, 0])
         error = (some.values - every.values)[busy, 0, 0] / deviation
-        assert np.sqrt(np.mean(error**2)) < 1.5
-        # eight neighbours are seen from nearly the same direction
+        assert np.sqrt(np.mean(error**2)) < 1.2
         spread = np.sqrt((1.0 - np.abs(every.view_phasor[busy]) ** 2) * 8.0 / some.samples[busy])
         assert np.all(np.abs(some.view_phasor - every.view_phasor)[busy] < 4.0 * spread + 1e-3)
 
