@@ -6,7 +6,7 @@ from arlight.rendering.default_object import default_object
 from arlight.rendering.relight import Relighter
 from arlight.rendering.settings import RelightSettings
 
-FINEST = RelightSettings(directions=1536, shadow_texels=256, supersampling=4, mesh_faces=160_000, renderer="moderngl")
+FINEST = RelightSettings(directions=1024, shadow_texels=256, supersampling=4, mesh_faces=80_000)
 """Settings of the pictures that others are compared with."""
 
 

@@ -108,8 +108,9 @@ class Suite:
         """What is measured, in order."""
         names = [workload.name for workload in (QUICK if self.quick else FULL)]
         parts = [Part(f"tracking, {name}", partial(self._tracking, name)) for name in names]
-        parts += [Part(f"drawing, {name}", partial(self._drawing, name)) for name in (HEADLINE, LARGE)]
-        parts += [Part(f"coding, {name}", partial(self._coding, name)) for name in (HEADLINE, LARGE)]
+        sizes = (HEADLINE,) if self.quick else (HEADLINE, LARGE)
+        parts += [Part(f"drawing, {name}", partial(self._drawing, name)) for name in sizes]
+        parts += [Part(f"coding, {name}", partial(self._coding, name)) for name in sizes]
         parts += [Part(f"loop, {name}", partial(self._loop, name)) for name in (HEADLINE, LARGE)]
         parts += [Part("first result", self._start), Part("bound", self._bound), Part("front", self._front)]
         if not self.quick:
@@ -136,7 +137,7 @@ class Suite:
 
     def _drawing(self, name: str) -> Findings:
         clip = self.clip(name)
-        return measure_drawing(clip, self._count(16, 48), self.relighters.of(clip.probe, clip.camera))
+        return measure_drawing(clip, self._count(13, 48), self.relighters.of(clip.probe, clip.camera))
 
     def _coding(self, name: str) -> Findings:
         return measure_coding(self.clip(name), self._count(3, 9), PRESETS["balanced"].encoding, self.scratch)
@@ -144,11 +145,11 @@ class Suite:
     def _loop(self, name: str) -> Findings:
         clip, preset = self.clip(name), PRESETS["balanced"]
         relighter = self.relighters.of(clip.probe, clip.camera, preset.relight)
-        frames, repeats = self._count(72, 240), self._count(3, 5)
+        frames, repeats = self._count(48, 240), self._count(3, 5)
         return measure_loop(clip, frames, repeats, preset, relighter, self.scratch)
 
     def _start(self) -> Findings:
-        return measure_start(self.clip(HEADLINE), self._count(3, 5), self.scratch)
+        return measure_start(self.clip(HEADLINE), self._count(2, 5), self.scratch)
 
     def _bound(self) -> Findings:
         return measure_bound(self.clip(HEADLINE), self._count(60, 240))

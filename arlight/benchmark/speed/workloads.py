@@ -103,7 +103,7 @@ _BLURRED = Sensor(blur_px=1.6)
 QUICK = (
     Workload(HEADLINE),
     Workload("720p order 3, still camera", Scene(order=3, path="still")),
-    Workload(LARGE, Scene(size=(1920, 1080), path="still", sheet_width_px=975.0)),
+    Workload(LARGE, Scene(size=(1920, 1080), path="still", sheet_width_px=975.0), half_cycle=6),
 )
 """The subset of `--quick`."""
 
