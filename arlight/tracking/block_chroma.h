@@ -1,8 +1,8 @@
 /* What the stored chroma of half the resolution says: it corrects the chroma expected of each block.
  *
- * Luma shows the stripes; chroma that several pixels share, coarsely quantised, does not. Its mean over a block corrects
- * the expected one always, its swing at the stripes' phase as far as the stream has kept it. How far that is, and by how
- * much chroma is displaced, is read off all blocks together.
+ * Luma shows the stripes; chroma that several pixels share, coarsely quantised, does not. Its mean over a block
+ * corrects the expected one always, its swing at the stripes' phase as far as the stream has kept it. How far that is,
+ * and by how much chroma is displaced, is read off all blocks together.
  */
 #ifndef ARLIGHT_BLOCK_CHROMA_H
 #define ARLIGHT_BLOCK_CHROMA_H
@@ -88,7 +88,7 @@ static void complex_series(const float *rows, double scale, double complex *out)
     }
 }
 
-/* Chroma that the block's luma and its hue let expect; luma's finer harmonics, which cells blur, are those predicted. */
+/* Chroma that the block's luma and its hue let expect; luma's finer harmonics, which cells blur, are as predicted. */
 static void expect(const Blocks *b, int block, Chroma *chroma)
 {
     const float *hue = b->hue + (int64_t)block * HUES * HUE;

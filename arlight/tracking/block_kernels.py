@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.errors import CameraError
 from arlight.native import Workspace, library
-from arlight.tracking.block_layout import BlockLayout
+from arlight.tracking.block_layout import WANTED, BlockLayout
 from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 from arlight.tracking.decoding import Decoding
 from arlight.tracking.lens import camera_parameters
@@ -20,13 +20,15 @@ from arlight.video.pixel_format import PixelFormat
 Array = NDArray[np.float64]
 
 _LANES, _STEP = 16, 8
+"""Blocks and pixels that are worked on together."""
 _LINE = 16
 """Floats of a cache line."""
-_EDGES, _CUBIC, _TERMS = 8, 4, 16
-_TINT = 1 + ROWS + 3
-_LISTS = 10 + 23
-_SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
-_PATTERNED, _WHITE, _WANTED = 1, 2, 4
+_EDGES, _CUBIC, _TERMS, _HUES = 8, 4, 16, 3
+LISTS = 10 + 16 + 3 + 4
+"""Lists of pixels; of a cubic fit's columns, its values, and what is read with them."""
+TINT = 1 + ROWS + 3
+SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
+"""Floats of `Tint` and `Sums` of blocks.h."""
 _RESULTS = (("values", ROWS * 3), ("covariance", ROWS * ROWS), ("variance", 3), ("shading", 3), ("cycles", 2),
             ("phasor", 2), ("cosine", 1), ("trust", 1))  # fmt: skip
 _ROUNDS = (*range(9), 12, 16, 24, 32, 40)
@@ -34,7 +36,7 @@ _STRAIGHT = 1e-6
 """How far rays of undistorted pixels may be off: a thousandth of a pixel."""
 
 
-class _Shared(Workspace):
+class Shared(Workspace):
     """`Blocks` of blocks.h."""
 
     _fields_ = (
@@ -70,63 +72,45 @@ class _Shared(Workspace):
 
 
 class BlockKernels:
-    """Compiled measuring of one sheet's blocks with one camera, and its memory."""
+    """Compiled measuring of one sheet's blocks with one camera, and its memory.
+
+    Args:
+        layout: the blocks.
+        camera: that films them.
+        samples: pixels a block at most, 16 or more.
+
+    Raises:
+        InstallationError: the compiled part is missing.
+    """
 
     def __init__(self, layout: BlockLayout, camera: Camera, samples: int) -> None:
         self._count = count = len(layout.half_mm)
-        self._layout = layout
+        self._layout, self._size = layout, camera.image_size
         n = -(-count // _LANES) * _LANES
-        self._size = width, height = camera.image_size
-        room = (min(samples, width * height) + 2 * _STEP + _LINE - 1) // _LINE * _LINE
         self.flags = np.zeros(n, np.uint8)
         self.pose = np.zeros(12)
         self.stripes = np.zeros((n, ROWS, 3))
-        self.hue = np.zeros((n, 3, ROWS + 1), np.float32)
+        self.hue = np.zeros((n, _HUES, ROWS + 1), np.float32)
         self.mean_code = np.zeros((n, 3))
         self.gathered = np.zeros(n, np.int32)
-        self.harmonics = np.zeros(n, np.int32)
-        parameters = camera_parameters(camera)
-        self._shared = _Shared(n, width, height)
-        self._shared.hold(
-            {
-                "lens": parameters,
-                "upright": np.linalg.inv(parameters[16:].reshape(3, 3)).ravel(),
-                "sheet": _sheet(layout, n),
-                "flags": self.flags,
-                "pose": self.pose,
-                "seen": np.zeros(n, np.int32),
-                "harmonics": self.harmonics,
-                "frequency": np.zeros((2, n), np.float32),
-                "margin": np.zeros((2, n), np.float32),
-                "gain": np.ones(n, np.float32),
-                "box": np.zeros((4, n), np.float32),
-                "edges": np.zeros((_EDGES, 3, n), np.float32),
-                "surfaces": _aligned((n, _CUBIC * _TERMS)),
-                "look": np.zeros((2, 5, n), np.float32),
-                "order": np.zeros(n, np.int32),
-                "spans": np.zeros((2, height), np.int32),
-                "rows": _aligned((height, _TERMS)),
-                "places": _aligned((3, room)).view(np.int32),
-                "codes": np.zeros((3, room), np.uint16),
-                "lists": _aligned((_LISTS, room)),
-                "hue": self.hue,
-                "tints": np.zeros((n, 3, _TINT), np.float32),
-                "mean_code": self.mean_code,
-                "sums": np.zeros((n, _SUMS), np.float32),
-                "gathered": self.gathered,
-            }
-        )
-        shared = self._shared
+        self._shared = shared = Shared(n, *camera.image_size)
+        own: dict[str, NDArray[np.generic]] = {
+            "flags": self.flags,
+            "pose": self.pose,
+            "hue": self.hue,
+            "mean_code": self.mean_code,
+        }
+        shared.hold({**own, "gathered": self.gathered, "sheet": _sheet(layout, n), **_views(n)})
         shared.vignetting[:] = camera.vignetting or (0.0, 0.0, 0.0)
-        shared.half_diagonal_px = 0.5 * float(np.hypot(width, height))
+        shared.half_diagonal_px = 0.5 * float(np.hypot(*camera.image_size))
         shared.reach_mm, shared.glass_mm = layout.slab.max_offset_mm, layout.slab.glass_mm
         shared.index = layout.slab.refractive_index
-        shared.limit, shared.room = samples, room
+        _prepare_lists(shared, samples)
         self._at = ctypes.byref(shared)
         self._format: PixelFormat | None = None
         self._curve: Decoding | None = None
         self._survey, self._measure, self._undistort = _functions()
-        shared.rounds = self._rounds(camera)
+        shared.rounds = self._prepare_lens(camera)
 
     def place(self, pose: Pose, edge_px: float, blocks: NDArray[np.bool_] | None) -> None:
         """Say where the sheet is and which of its blocks are wanted."""
@@ -136,7 +120,7 @@ class BlockKernels:
         layout = self._layout
         self.flags[: self._count] = layout.flags
         if blocks is not None:
-            self.flags[: self._count][~np.asarray(blocks, bool)] &= ~np.uint8(_WANTED)
+            self.flags[: self._count][~np.asarray(blocks, bool)] &= ~np.uint8(WANTED)
 
     def show(self, frame: Frame, curve: Decoding) -> None:
         """Say what to measure on, and what its codes stand for.
@@ -204,8 +188,10 @@ class BlockKernels:
         self._undistort(self._at, rounds, len(pixels), columns.ctypes.data, rays.ctypes.data)
         return rays.T.astype(float)
 
-    def _rounds(self, camera: Camera) -> int:
+    def _prepare_lens(self, camera: Camera) -> int:
         """The fewest rounds that undo the distortion all over the picture."""
+        parameters = camera_parameters(camera)
+        self._shared.hold({"lens": parameters, "upright": np.linalg.inv(parameters[16:].reshape(3, 3)).ravel()})
         width, height = camera.image_size
         across, down = np.meshgrid(np.linspace(0.0, width - 1.0, 16), np.linspace(0.0, height - 1.0, 16))
         pixels = np.stack([across.ravel(), down.ravel()], axis=1)
@@ -242,6 +228,40 @@ def _aligned(shape: tuple[int, int]) -> NDArray[np.float32]:
     return memory[start : start + shape[0] * shape[1]].reshape(shape)
 
 
+def _views(n: int) -> dict[str, NDArray[np.generic]]:
+    """Memory for how n blocks appear."""
+    return {
+        "seen": np.zeros(n, np.int32),
+        "harmonics": np.zeros(n, np.int32),
+        "frequency": np.zeros((2, n), np.float32),
+        "margin": np.zeros((2, n), np.float32),
+        "gain": np.ones(n, np.float32),
+        "box": np.zeros((4, n), np.float32),
+        "edges": np.zeros((_EDGES, 3, n), np.float32),
+        "surfaces": _aligned((n, _CUBIC * _TERMS)),
+        "look": np.zeros((2, 5, n), np.float32),
+        "order": np.zeros(n, np.int32),
+        "tints": np.zeros((n, 3, TINT), np.float32),
+        "sums": np.zeros((n, SUMS), np.float32),
+    }
+
+
+def _prepare_lists(shared: Shared, samples: int) -> None:
+    """Memory for the pixels of one block, `samples` at most."""
+    height = shared.height
+    room = (min(samples, shared.width * height) + 2 * _STEP + _LINE - 1) // _LINE * _LINE
+    shared.limit, shared.room = samples, room
+    shared.hold(
+        {
+            "spans": np.zeros((2, height), np.int32),
+            "rows": _aligned((height, _TERMS)),
+            "places": _aligned((3, room)).view(np.int32),
+            "codes": np.zeros((3, room), np.uint16),
+            "lists": _aligned((LISTS, room)),
+        }
+    )
+
+
 def _sheet(layout: BlockLayout, n: int) -> NDArray[np.float32]:
     cycles = np.sum(layout.cycles_per_mm * layout.centers_mm, axis=1) + layout.phase_rad / (2.0 * np.pi)
     rows = np.vstack([layout.centers_mm.T, layout.half_mm, layout.cycles_per_mm.T, cycles - np.round(cycles)])
@@ -249,7 +269,7 @@ def _sheet(layout: BlockLayout, n: int) -> NDArray[np.float32]:
     return np.ascontiguousarray(np.hstack([rows, padding]), np.float32)
 
 
-def _describe(shared: _Shared, format_: PixelFormat) -> None:
+def _describe(shared: Shared, format_: PixelFormat) -> None:
     stored = format_.matrix in ("rgb", "gray")
     black, white = format_.luma_code_range
     neutral, swing = (black, white) if stored else format_.chroma_code_range

@@ -16,10 +16,11 @@ static HOT int list_columns(int harmonics, const Pixels *p, int64_t room, float 
         columns[i] = i < p->total ? 1.0f : 0.0f;
     for (int k = 1; k <= harmonics; k++) {
         float *restrict cosine = columns + (2 * k - 1) * room, *restrict sine = cosine + room;
-        const float *restrict last_c = k > 1 ? cosine - 2 * room : columns, *restrict last_s = k > 1 ? sine - 2 * room : s;
+        /* of the 0th harmonic: one and nothing */
+        const float *restrict last = columns + (k > 1 ? 2 * k - 3 : 0) * room, *restrict last_sine = last + room;
         for (int i = 0; i < steps; i++) {
-            cosine[i] = k > 1 ? last_c[i] * c[i] - last_s[i] * s[i] : c[i];
-            sine[i] = k > 1 ? last_s[i] * c[i] + last_c[i] * s[i] : s[i];
+            cosine[i] = k > 1 ? last[i] * c[i] - last_sine[i] * s[i] : c[i];
+            sine[i] = k > 1 ? last_sine[i] * c[i] + last[i] * s[i] : s[i];
         }
     }
     float *restrict out = columns + count * room;
@@ -120,8 +121,8 @@ static void treat_lamps(const Blocks *b, int count, const float level[CHANNELS],
     memcpy(uneven, b->shading, (size_t)b->blocks * CHANNELS * sizeof *uneven);
     for (int at = 0; at <= count; at++) {
         int lamp = at < count && largest_of(b->variance + (int64_t)b->order[at] * CHANNELS) > limit * limit;
-        int full = some && (at == count || some == FITS || (lamp && b->harmonics[b->order[at]] != b->harmonics[b->order[lamps[0]]]));
-        if (full) {
+        int other = some && lamp && b->harmonics[b->order[at]] != b->harmonics[b->order[lamps[0]]];
+        if (some == FITS || other || (some && at == count)) {
             fit_lamps(b, lamps, some, level);
             some = 0;
         }

@@ -5,7 +5,8 @@
 #include "block_spans.h"
 
 /* Lists of pixels. */
-enum { PHASE_LIST, X_LIST, Y_LIST, SINE_LIST, CODE_LIST, LIGHT_LIST = CODE_LIST + CHANNELS, LISTS = LIGHT_LIST + CHANNELS };
+enum { PHASE_LIST, X_LIST, Y_LIST, SINE_LIST, CODE_LIST, LIGHT_LIST = CODE_LIST + CHANNELS };
+enum { LISTS = LIGHT_LIST + CHANNELS };
 
 INLINE float *list_of(const Blocks *b, int which)
 {
@@ -197,8 +198,8 @@ static HOT void convert_codes(const Blocks *b, int plane, int total, float *valu
         convert(total, codes, 2, offset, scale, values);
 }
 
-/* Lists the cells of a block and the planes' values; for CELLS Cb and Cr, and their mean luma in the list of light. Takes
- * `limit` of them at most; returns how many there are. */
+/* Lists the cells of a block, `limit` at most, and the planes' values; for CELLS Cb and Cr, and their mean luma in the
+ * list of light. Returns how many there are. */
 static HOT int list_points(const Blocks *b, int block, const Grid *grid, int limit, int what)
 {
     Span span = span_of(b, block, grid);

@@ -107,8 +107,8 @@ INLINE float chance(uint32_t place)
     return (float)(place >> 8) * 5.9604645e-8f;
 }
 
-/* Keeps at most `limit` cells: a few neighbours at random of every so many, in reading order, because evenly spaced ones
- * would alias the stripes. */
+/* Keeps at most `limit` cells: a few neighbours at random of every so many, in reading order, because evenly spaced
+ * ones would alias the stripes. */
 static HOT void thin_out(Span *span, int limit)
 {
     int all = 0;

@@ -104,14 +104,11 @@ INLINE Fits gather_sums(const Sums *sums, int some, const float *field)
     return out;
 }
 
-/* Normal equations of some blocks' sums: columns 1, cos 1, sin 1, ..., x, y where there is shading. Products of waves
- * are sums of two others. */
-static HOT void fill_fits(SmallFits *f, const Sums *sums, int some, int harmonics, int shading)
+/* Products of waves are sums of two others. */
+INLINE void fill_waves(SmallFits *f, const Sums *sums, int some, int harmonics)
 {
-    int waves = 2 * harmonics + 1;
     Fits c[2 * HARMONICS + 1] = {gather_sums(sums, some, sums->cosine)}, s[2 * HARMONICS + 1] = {0.0 * c[0]};
     Fits(*normal)[COLUMNS] = f->normal;
-    f->columns = waves + (shading ? 2 : 0);
     for (int k = 1; k <= 2 * harmonics; k++) {
         c[k] = gather_sums(sums, some, sums->cosine + k);
         s[k] = gather_sums(sums, some, sums->sine + k);
@@ -128,25 +125,39 @@ static HOT void fill_fits(SmallFits *f, const Sums *sums, int some, int harmonic
                 normal[2 * i - 1][2 * j] = 0.5 * (s[i + j] - s[i - j]);
         }
     }
-    for (int k = 0; k <= harmonics && shading; k++) {
-        normal[waves][k ? 2 * k - 1 : 0] = gather_sums(sums, some, sums->x_cosine + k);
-        normal[waves + 1][k ? 2 * k - 1 : 0] = gather_sums(sums, some, sums->y_cosine + k);
-        if (k) {
-            normal[waves][2 * k] = gather_sums(sums, some, sums->x_sine + k);
-            normal[waves + 1][2 * k] = gather_sums(sums, some, sums->y_sine + k);
-        }
+}
+
+INLINE void fill_shading(SmallFits *f, const Sums *sums, int some, int harmonics)
+{
+    int waves = 2 * harmonics + 1;
+    Fits *x = f->normal[waves], *y = f->normal[waves + 1];
+    x[0] = gather_sums(sums, some, sums->x_cosine);
+    y[0] = gather_sums(sums, some, sums->y_cosine);
+    for (int k = 1; k <= harmonics; k++) {
+        x[2 * k - 1] = gather_sums(sums, some, sums->x_cosine + k);
+        y[2 * k - 1] = gather_sums(sums, some, sums->y_cosine + k);
+        x[2 * k] = gather_sums(sums, some, sums->x_sine + k);
+        y[2 * k] = gather_sums(sums, some, sums->y_sine + k);
     }
-    if (shading) {
-        normal[waves][waves] = gather_sums(sums, some, &sums->xx);
-        normal[waves + 1][waves] = gather_sums(sums, some, &sums->xy);
-        normal[waves + 1][waves + 1] = gather_sums(sums, some, &sums->yy);
-    }
-    for (int k = 0; k < f->rights; k++) {
+    x[waves] = gather_sums(sums, some, &sums->xx);
+    y[waves] = gather_sums(sums, some, &sums->xy);
+    y[waves + 1] = gather_sums(sums, some, &sums->yy);
+    for (int k = 0; k < f->rights; k++)
+        for (int i = 0; i < 2; i++)
+            f->right[k][waves + i] = gather_sums(sums, some, sums->right[k] + ROWS + i);
+}
+
+/* Normal equations of some blocks' sums: columns 1, cos 1, sin 1, ..., and x, y where there is shading. */
+static HOT void fill_fits(SmallFits *f, const Sums *sums, int some, int harmonics, int shading)
+{
+    int waves = 2 * harmonics + 1;
+    f->columns = waves + (shading ? 2 : 0);
+    fill_waves(f, sums, some, harmonics);
+    for (int k = 0; k < f->rights; k++)
         for (int i = 0; i < waves; i++)
             f->right[k][i] = gather_sums(sums, some, sums->right[k] + i);
-        for (int i = 0; i < 2 && shading; i++)
-            f->right[k][waves + i] = gather_sums(sums, some, sums->right[k] + ROWS + i);
-    }
+    if (shading)
+        fill_shading(f, sums, some, harmonics);
 }
 
 #endif

@@ -29,7 +29,8 @@ static float white_level(const float (*mean)[CHANNELS], int whites, int channel)
     sort(values, count);
     float at = 0.25f * (float)(count - 1);
     int below = (int)at;
-    return count == 0 ? 0.0f : values[below] + (at - (float)below) * (values[below + (below + 1 < count)] - values[below]);
+    int above = below + 1 < count ? below + 1 : below;
+    return count == 0 ? 0.0f : values[below] + (at - (float)below) * (values[above] - values[below]);
 }
 
 /* Leaves out the pixels that are brighter than the ceiling in any channel. */

@@ -56,7 +56,8 @@ INLINE void measure_slopes(const Blocks *b, int first, const Lane *px, const Lan
         float yx = side * (py[2][l] + py[3][l] - py[1][l] - py[4][l]);
         float xy = side * (px[3][l] + px[4][l] - px[1][l] - px[2][l]);
         float yy = side * (py[3][l] + py[4][l] - py[1][l] - py[2][l]);
-        float determinant = xx * yy - xy * yx, over = 1.0f / determinant, size = over < 0.0f ? -edge * over : edge * over;
+        float determinant = xx * yy - xy * yx, over = 1.0f / determinant;
+        float size = over < 0.0f ? -edge * over : edge * over;
         frequency[l] = (yy * u - yx * v) * over;
         frequency[n + l] = (xx * v - xy * u) * over;
         margin[l] = size * sqrtf(yy * yy + xy * xy);

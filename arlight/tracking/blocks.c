@@ -83,6 +83,9 @@ static void fit_blocks(const Blocks *b, int count)
     }
 }
 
+/* Bytes of what is shared with Python, and lists of pixels. */
+EXPORT const int64_t block_memory[] = {sizeof(Blocks), sizeof(Sums), sizeof(Tint), LISTS + COLUMNS + CHANNELS + 4};
+
 /* Rays (2, count) of pixels (2, count), of whole LANES. */
 EXPORT HOT void undistort_pixels(const Blocks *b, int64_t rounds, int64_t count, const float *pixels, float *rays)
 {

@@ -50,7 +50,7 @@ typedef struct {
     float *gain;        /* (n) vignetting in the block's middle */
     float *box;         /* (4, n) middle x, y and half the size x, y of the part in the picture [px] */
     float *edges;       /* (EDGES, 3, n) a, b, c: a x + b y <= c inside, from the box's middle [px] */
-    float *surfaces;    /* (n, CUBIC, TERMS) coefficients by power of v: of u^k for each surface; -1 to 1 over the box */
+    float *surfaces;    /* (n, CUBIC, TERMS) by power of v: coefficients of u^k; u, v from -1 to 1 over the box */
     float *look;        /* (2, 5, n) the view's phase 2 pi f.D, and cosine: value, slopes, half second slopes */
 
     int64_t limit;         /* pixels a block at most */

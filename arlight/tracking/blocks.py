@@ -20,8 +20,11 @@ from arlight.video.frame import Frame
 Array = NDArray[np.float64]
 
 _MIN_SAMPLES = 24
+"""Pixels that a block's colour must be the mean of."""
 _EDGE_PX = 1.5
+"""Pixels to keep from a block's border for the pixel's own square and the codec, beside the blur."""
 _UNRESOLVED_BLUR_PX = 0.6
+_FEWEST_SAMPLES = 16
 _ANY_LUMA = 100.0
 """More luma than there is: no pixel is brighter than stripes that are not known."""
 
@@ -33,12 +36,14 @@ class BlockMeter:
         """Prepare for a sheet and a camera.
 
         Args:
+            probe: the sheet.
+            camera: that films it.
+            max_samples: pixels a block is sampled with at most, 16 or more; of larger images some are chosen by chance.
             assembly: where the sheet's film lies and how thick its glass is, when that is known.
-            max_samples: pixels a block is sampled with at most; larger images are thinned out.
         """
         self._camera = camera
         self._layout = BlockLayout.of_probe(probe, assembly)
-        self._kernels = BlockKernels(self._layout, camera, max_samples)
+        self._kernels = BlockKernels(self._layout, camera, max(max_samples, _FEWEST_SAMPLES))
 
     def measure(
         self,
@@ -55,10 +60,14 @@ class BlockMeter:
             pose: camera_from_probe.
             blur_px: standard deviation of the picture's blur [px].
             stripes: (blocks, 7, 3) rows that the last estimate predicts; guide what subsampled chroma cannot show.
-            blocks: (blocks,) which to measure; the others cost nothing and are not valid. All by default.
+            blocks: (blocks,) which to measure; the others cost nothing and are not valid. White blocks among them tell
+                how bright a stripe can be. All by default.
 
         Returns:
             The measurements, in the order of `field_blocks(probe)`.
+
+        Raises:
+            CameraError: the frame's size is not the camera's.
         """
         curve = decoding(frame.format.transfer, self._camera.radiometry)
         self._kernels.place(pose, _EDGE_PX + (blur_px if np.isfinite(blur_px) else _UNRESOLVED_BLUR_PX), blocks)
