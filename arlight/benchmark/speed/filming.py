@@ -31,6 +31,7 @@ CLIP_NAME = "clip.mp4"
 TRUTH_NAME = "clip.truth.json"
 
 _SEED = 20
+_SAMPLING = Sampling(spacing_mm=0.2)
 _PRESET = "veryfast"
 
 
@@ -78,7 +79,7 @@ class _Studio:
         """Linear radiance (h, w, 3) by the time it is seen."""
         probe, camera, script, motion = scene.probe, self.camera(scene), scene.light, scene.motion
         transport = self._transport(scene.order, scene.april_tags)
-        renderer = SheetRenderer(transport.layers, probe.slab, camera, Sampling())
+        renderer = SheetRenderer(transport.layers, probe.slab, camera, _SAMPLING)
         shown: dict[str, int] = {}
         pictures: dict[float, NDArray[np.float32]] = {}
         try:
