@@ -2,78 +2,86 @@
 #include "native.h"
 
 enum {
-    CELL = 8,     /* pixels between two nodes of the net of rays, as in composite.py */
-    STRETCH = 16, /* cells of a row that are looked up before they are written */
+    CELL = 8, /* pixels between two nodes of the net of rays, as in composite.py */
+    NODE = 4, /* pixels between two at which the ratio is looked up: it is smooth, a texel of the map wider than this */
 };
 
 typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
 typedef struct {
-    float *gain;        /* (height, width, 3) what the light of a region of the frame is multiplied by */
+    float *gain;        /* (height * width * 3 + 1) what the light of a region of the frame is multiplied by */
     const float *rays;  /* (node_rows, node_columns, 2) undistorted rays (x, y, 1) at every CELL-th pixel */
     const float *ratio; /* (side, side, 4) red, green, blue, unused */
+    float *lines;       /* (3, width / NODE + 2, 4) scratch: the ratio at two lines of nodes, and between them */
     int64_t x0, y0, width, height, node_columns, side;
     double texel_from_ray[9]; /* homogeneous (column, row) of the plane's point that a ray meets */
 } Plane;
 
-/* Homogeneous texels (u, v, w) at two neighbouring nodes of a row: the first, and the change to the second. */
-static inline void texels_of_cell(const Plane *p, int64_t column, int64_t y, float start[3], float change[3])
+/* Homogeneous texel (u, v, w) of the plane's point that a pixel sees. */
+static inline void texel_of_pixel(const Plane *p, int64_t x, int64_t y, float texel[3])
 {
-    float below = (float)(y % CELL) / CELL;
-    const float *upper = p->rays + 2 * (y / CELL * p->node_columns + column), *lower = upper + 2 * p->node_columns;
-    float x0 = upper[0] + below * (lower[0] - upper[0]), y0 = upper[1] + below * (lower[1] - upper[1]);
-    float x1 = upper[2] + below * (lower[2] - upper[2]), y1 = upper[3] + below * (lower[3] - upper[3]);
+    float right = (float)(x % CELL) / CELL, below = (float)(y % CELL) / CELL;
+    const float *upper = p->rays + 2 * (y / CELL * p->node_columns + x / CELL), *lower = upper + 2 * p->node_columns;
+    float ray[2];
+    for (int i = 0; i < 2; i++) {
+        float above = upper[i] + right * (upper[i + 2] - upper[i]), under = lower[i] + right * (lower[i + 2] - lower[i]);
+        ray[i] = above + below * (under - above);
+    }
     for (int i = 0; i < 3; i++) {
         const double *m = p->texel_from_ray + 3 * i;
-        start[i] = (float)(m[0] * x0 + m[1] * y0 + m[2]);
-        change[i] = (float)(m[0] * (x1 - x0) + m[1] * (y1 - y0));
+        texel[i] = (float)(m[0] * ray[0] + m[1] * ray[1] + m[2]);
     }
 }
 
-/* Texels (u, v) of a cell's pixels; u is negative where they do not see the plane. */
-static inline void texels_of_pixels(const float start[3], const float change[3], float *restrict u, float *restrict v)
+/* The ratio at a texel, bilinear; 1 outside of the map, and above the horizon. */
+static inline Four ratio_at(const Plane *p, const float texel[3])
 {
-#pragma GCC unroll 1
-    for (int i = 0; i < CELL; i++) {
-        float share = (float)i / CELL, w = start[2] + share * change[2], inverse = 1.0f / w;
-        float across = (start[0] + share * change[0]) * inverse;
-        u[i] = w > 0.0f ? across : -1.0f;
-        v[i] = (start[1] + share * change[1]) * inverse;
-    }
-}
-
-/* The ratio at a texel (u, v), bilinear; 1 outside of the map. */
-static inline Four ratio_at(const Plane *p, float last, float u, float v)
-{
-    if (!(u >= 0.0f && u < last && v >= 0.0f && v < last))
+    float last = (float)(p->side - 1), inverse = 1.0f / texel[2], u = texel[0] * inverse, v = texel[1] * inverse;
+    if (!(texel[2] > 0.0f && u >= 0.0f && u < last && v >= 0.0f && v < last))
         return (Four){1.0f, 1.0f, 1.0f, 1.0f};
     int32_t column = (int32_t)u, row = (int32_t)v;
-    const Four *texel = (const Four *)p->ratio + row * p->side + column;
+    const Four *at = (const Four *)p->ratio + row * p->side + column;
     float fu = u - (float)column, fv = v - (float)row;
-    Four upper = texel[0] + fu * (texel[1] - texel[0]);
-    Four lower = texel[p->side] + fu * (texel[p->side + 1] - texel[p->side]);
+    Four upper = at[0] + fu * (at[1] - at[0]);
+    Four lower = at[p->side] + fu * (at[p->side + 1] - at[p->side]);
     return upper + fv * (lower - upper);
 }
 
-/* The ratio at each pixel's point of the plane; 1 outside of the map, and above the horizon. */
+/* The ratio at the nodes of one of the picture's rows. */
+static void look_up_line(const Plane *p, int64_t y, int64_t nodes, Four *restrict line)
+{
+    float texel[3];
+    for (int64_t k = 0; k < nodes; k++) {
+        texel_of_pixel(p, p->x0 + NODE * k, y, texel);
+        line[k] = ratio_at(p, texel);
+    }
+}
+
+/* A row of pixels between nodes; each one's fourth number is overwritten by the next one's first. */
+static HOT void spread_line(const Four *restrict line, int64_t width, float *restrict gain)
+{
+    for (int64_t x = 0; x < width; x++) {
+        float share = (float)(x % NODE) / NODE;
+        const Four *node = line + x / NODE;
+        *(Four *)(gain + 3 * x) = node[0] + share * (node[1] - node[0]);
+    }
+}
+
+/* What the light of a region is multiplied by: the ratio at each pixel's point of the plane. */
 EXPORT HOT void plane_gain(const Plane *p)
 {
-    float last = (float)(p->side - 1), u[CELL], v[CELL], factors[3 * CELL * STRETCH + 1];
-    int64_t end = p->x0 + p->width;
-    for (int64_t row = 0; row < p->height; row++)
-        for (int64_t cell = p->x0 / CELL; cell * CELL < end; cell += STRETCH) {
-            int64_t stop = (cell + STRETCH) * CELL < end ? STRETCH * CELL : end - cell * CELL;
-            for (int64_t i = 0; i < stop; i += CELL) {
-                float start[3], change[3];
-                texels_of_cell(p, cell + i / CELL, p->y0 + row, start, change);
-                texels_of_pixels(start, change, u, v);
-                /* the fourth number is overwritten by the next pixel's first */
-                for (int j = 0; j < CELL; j++)
-                    *(Four *)(factors + 3 * (i + j)) = ratio_at(p, last, u[j], v[j]);
-            }
-            int64_t first = cell * CELL < p->x0 ? p->x0 - cell * CELL : 0;
-            float *pixels = p->gain + 3 * (row * p->width + cell * CELL - p->x0);
-            for (int64_t i = 3 * first; i < 3 * stop; i++)
-                pixels[i] = factors[i];
+    int64_t nodes = (p->width + NODE - 1) / NODE + 1;
+    Four *above = (Four *)p->lines, *below = above + nodes, *between = below + nodes;
+    look_up_line(p, p->y0, nodes, below);
+    for (int64_t row = 0; row < p->height; row++) {
+        float share = (float)(row % NODE) / NODE;
+        if (row % NODE == 0) {
+            Four *used = above;
+            above = below, below = used;
+            look_up_line(p, p->y0 + row + NODE, nodes, below);
         }
+        for (int64_t k = 0; k < nodes; k++)
+            between[k] = above[k] + share * (below[k] - above[k]);
+        spread_line(between, p->width, p->gain + 3 * row * p->width);
+    }
 }

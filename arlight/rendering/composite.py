@@ -14,6 +14,8 @@ Image = NDArray[np.float32]
 
 _CELL_PX = 8
 """Between two nodes of the net of rays, as in composite.c: a lens bends what lies between by less than 0.02 px."""
+_NODE_PX = 4
+"""Between two pixels at which the ratio is looked up, as in composite.c."""
 _native = library(__file__, "composite")
 _native.plane_gain.restype = None
 _native.plane_gain.argtypes = [ctypes.c_void_p]
@@ -21,7 +23,7 @@ _native.plane_gain.argtypes = [ctypes.c_void_p]
 
 class _Plane(Workspace):
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("gain", "rays", "ratio")),
+        *((name, ctypes.c_void_p) for name in ("gain", "rays", "ratio", "lines")),
         *((name, ctypes.c_int64) for name in ("x0", "y0", "width", "height", "node_columns", "side")),
         ("texel_from_ray", ctypes.c_double * 9),
     )
@@ -37,12 +39,13 @@ class PlaneShader:
             camera: intrinsics.
             grid: where the ratio's texels lie on the plane z = 0.
         """
-        # one node beyond the last pixel on each side, so that every cell has two
+        # nodes beyond the last pixel on each side, so that every cell has two
         x, y = (np.arange(size // _CELL_PX + 2) * float(_CELL_PX) for size in camera.image_size)
         nodes = np.stack(np.meshgrid(x, y), axis=-1)
         rays = camera.rays(nodes.reshape(-1, 2)).astype(np.float32)
         self._plane = _Plane(node_columns=len(x), side=grid.side)
-        self._plane.hold({"rays": rays})
+        lines = np.empty((3, camera.image_size[0] // _NODE_PX + 2, 4), np.float32)
+        self._plane.hold({"rays": rays, "lines": lines})
         self._buffer = np.empty(0, np.float32)
         self._texel_from_plane = np.array(
             [
@@ -82,6 +85,6 @@ class PlaneShader:
 
     def _room(self, width: int, height: int) -> Image:
         """Memory that was touched before: to get it afresh for every frame takes longer than to fill it."""
-        if self._buffer.size < 3 * width * height:
-            self._buffer = np.empty(3 * width * height, np.float32)
+        if self._buffer.size <= 3 * width * height:
+            self._buffer = np.empty(3 * width * height + 1, np.float32)
         return self._buffer[: 3 * width * height].reshape(height, width, 3)
