@@ -38,20 +38,12 @@ typedef struct {
     char *codes[CHANNELS];
 } Reader;
 
-/* Neighbours in a row, a step at most. */
+/* Neighbours in a row. */
 typedef struct {
     int row, left, count; /* in the plane */
     int at;               /* place in the lists */
-    const float *terms;   /* (SURFACES, CUBIC) coefficients of u^k */
+    const float *terms;   /* (SURFACES, CUBIC) coefficients of u^k; the cubic one matters for the phase alone */
 } Cells;
-
-/* Phase, x and y at some columns; their cubic part matters for the phase alone. */
-INLINE void place(const Reader *s, const float *k, Vector u, int at)
-{
-    *(Vector *)(s->phase + at) = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
-    *(Vector *)(s->x + at) = k[4] + u * (k[5] + u * k[6]);
-    *(Vector *)(s->y + at) = k[8] + u * (k[9] + u * k[10]);
-}
 
 /* Sums of neighbouring pairs of codes. */
 INLINE Columns sum_pairs(const char *from, int bytes)
@@ -64,19 +56,31 @@ INLINE Columns sum_pairs(const char *from, int bytes)
     return (Columns)((pairs & 65535) + (pairs >> 16));
 }
 
-/* Lists neighbours, a whole step: what is too much is written over by the next. */
-INLINE void list_step(const Reader *s, Cells cells, int what, int bytes, int down)
+/* Lists neighbours, in whole steps or a single one: what is too much is written over by the next. */
+INLINE void list_steps(const Reader *s, Cells cells, int single, int what, int bytes, int down)
 {
-    place(s, cells.terms, s->left + s->step * __builtin_convertvector(cells.left + EACH, Vector), cells.at);
-    for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-        memcpy(s->codes[plane] + cells.at * bytes, s->from[plane] + cells.row * s->stride[plane] + cells.left * bytes,
-               (size_t)(STEP * bytes));
-    if (what == CELLS) {
-        const char *from = s->from[0] + cells.row * s->stride[0] + 2 * cells.left * bytes;
-        Columns sum = sum_pairs(from, bytes);
-        if (down == 2)
-            sum += sum_pairs(from + s->luma_stride, bytes);
-        *(Vector *)(s->luma + cells.at) = __builtin_convertvector(sum, Vector);
+    float *phase = s->phase + cells.at, *x = s->x + cells.at, *y = s->y + cells.at, *luma = s->luma + cells.at;
+    int first_plane = what == CELLS, planes = what == LUMA ? 1 : CHANNELS;
+    const char *from[CHANNELS], *pairs = s->from[0] + cells.row * s->stride[0] + 2 * cells.left * bytes;
+    char *codes[CHANNELS];
+    for (int plane = first_plane; plane < planes; plane++) {
+        from[plane] = s->from[plane] + cells.row * s->stride[plane] + cells.left * bytes;
+        codes[plane] = s->codes[plane] + cells.at * bytes;
+    }
+    Vector u = s->left + s->step * __builtin_convertvector(cells.left + EACH, Vector);
+    const float *k = cells.terms, forward = s->step * STEP;
+    for (int i = 0; i < (single ? 1 : cells.count); i += STEP, u += forward) {
+        *(Vector *)(phase + i) = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
+        *(Vector *)(x + i) = k[4] + u * (k[5] + u * k[6]);
+        *(Vector *)(y + i) = k[8] + u * (k[9] + u * k[10]);
+        for (int plane = first_plane; plane < planes; plane++)
+            memcpy(codes[plane] + i * bytes, from[plane] + i * bytes, (size_t)(STEP * bytes));
+        if (what == CELLS) {
+            Columns sum = sum_pairs(pairs + 2 * i * bytes, bytes);
+            if (down == 2)
+                sum += sum_pairs(pairs + 2 * i * bytes + s->luma_stride, bytes);
+            *(Vector *)(luma + i) = __builtin_convertvector(sum, Vector);
+        }
     }
 }
 
@@ -107,17 +111,17 @@ static void list_singly(const Reader *s, Cells cells, int what)
 }
 
 /* Lists neighbours; the usual ones have code of their own. */
-INLINE void list_some(const Reader *s, Cells cells, int what)
+INLINE void list_some(const Reader *s, Cells cells, int single, int what)
 {
-    /* a whole step may run into the next row of the plane, not beyond the last */
-    if (!s->together || (cells.row + 1 == s->height && cells.left + STEP > s->width))
+    /* whole steps may run into the next row of the plane, not beyond the last */
+    if (!s->together || (cells.row + 1 == s->height && cells.left + whole_steps(cells.count) > s->width))
         list_singly(s, cells, what);
     else if (what == CELLS && s->bytes == 1)
-        list_step(s, cells, CELLS, 1, s->down);
+        list_steps(s, cells, single, CELLS, 1, s->down);
     else if (what == LUMA && s->bytes == 1)
-        list_step(s, cells, LUMA, 1, 1);
+        list_steps(s, cells, single, LUMA, 1, 1);
     else
-        list_step(s, cells, what, s->bytes, s->down);
+        list_steps(s, cells, single, what, s->bytes, s->down);
 }
 
 static Reader reader_of(const Blocks *b, int block, int what, const Grid *grid)
@@ -159,20 +163,21 @@ static HOT int list_cells(const Blocks *b, int block, const Grid *grid, const Sp
     Reader s = reader_of(b, block, what, grid);
     Cells cells = {.at = 0};
     for (int r = 0, first = 0, next = 0; r < span->rows; r++) {
-        int steps = whole_steps(span->count[r]) / STEP, left = span->left[r], end = left + span->count[r];
-        cells.row = span->first_row + r;
+        int steps = whole_steps(span->count[r]) / STEP;
+        cells.row = span->first_row + r, cells.left = span->left[r], cells.count = span->count[r];
         cells.terms = b->rows + r * TERMS;
-        for (int step = 0; step < steps; step++) {
-            if (span->chosen >= 0) {
-                if (next == span->chosen || span->steps[next] >= first + steps)
-                    break;
-                step = span->steps[next++] - first;
-            }
-            cells.left = left + step * STEP;
-            cells.count = end - cells.left < STEP ? end - cells.left : STEP;
-            cells.count = cells.count < span->total - cells.at ? cells.count : span->total - cells.at;
-            list_some(&s, cells, what);
+        if (span->chosen < 0) {
+            list_some(&s, cells, 0, what);
             cells.at += cells.count;
+        }
+        for (; next < span->chosen && span->steps[next] < first + steps; next++) {
+            Cells chosen = cells;
+            int passed = (span->steps[next] - first) * STEP, most = span->total - cells.at;
+            chosen.left += passed;
+            chosen.count = cells.count - passed < STEP ? cells.count - passed : STEP;
+            chosen.count = chosen.count < most ? chosen.count : most;
+            list_some(&s, chosen, 1, what);
+            cells.at += chosen.count;
         }
         first += steps;
     }
