@@ -108,22 +108,24 @@ class LightingTracker:
         )
         self._filter = LightingFilter()
         self._exposure = _exposure_meter(probe, camera)
-        self._frequencies = probe.frequencies
+        self._frequencies, self._highest = probe.frequencies, probe.order
         self._block_order = _block_orders(probe)
         # products this small run slower on several threads than on one
         self._blas = ThreadpoolController().select(user_api="blas")
-        self.require(Need.of_coefficients(probe.frequencies))
+        self._choice: OrderChoice | None = None
         self.reset()
 
     def require(self, need: Need) -> None:
-        """Say what the light is wanted for, which the order `auto` goes by; all coefficients by default."""
-        self._choice = OrderChoice(self._frequencies, need)
+        """Say what the light is wanted for, which the order `auto` goes by; until then all orders are measured."""
+        if self.settings.order == "auto":
+            self._choice = OrderChoice(self._frequencies, need)
 
     def reset(self) -> None:
         """Forget everything about earlier frames."""
         self._tracker.reset()
         self._filter.reset()
-        self._choice.reset()
+        if self._choice is not None:
+            self._choice.reset()
         self._last: Estimate | None = None
         self._level = np.ones(3)
         self._since_estimate = 0
@@ -146,7 +148,7 @@ class LightingTracker:
         raw = None if estimate is None else estimate.lighting
         estimated = self._clock()
         lighting = self._filtered(raw, frame, pose) if self.settings.filtered else raw
-        if raw is not None and lighting is not None:
+        if self._choice is not None and raw is not None and lighting is not None:
             self._choice.learn(raw, lighting, frame.time_s)
         timings = {
             "track": tracked - start,
@@ -189,13 +191,9 @@ class LightingTracker:
         return last, measured
 
     def _order_to_measure(self, time_s: float) -> int:
-        match self.settings.order:
-            case "auto":
-                order = self._choice.order_to_measure(time_s)
-            case "all":
-                order = self._choice.highest
-            case order:
-                pass
+        order = self.settings.order if isinstance(self.settings.order, int) else self._highest
+        if self._choice is not None:
+            order = self._choice.order_to_measure(time_s)
         return order if self.effort.order is None else min(order, self.effort.order)
 
     def _filtered(self, raw: Lighting | None, frame: Frame, pose: ProbePose) -> Lighting | None:
@@ -205,7 +203,7 @@ class LightingTracker:
             paper = self._exposure.measure(frame, pose.camera_from_probe)
             if np.all(paper.variance < (_LEVEL_DEVIATION * paper.level) ** 2):
                 self._level = paper.level
-        if raw is not None and self.settings.order == "auto" and raw.order > self._choice.order:
+        if self._choice is not None and raw is not None and raw.order > self._choice.order:
             raw = raw.truncated(self._choice.order)
         return self._filter.update(raw, frame.time_s, self._level, hidden=not seen)
 

@@ -19,8 +19,8 @@ class TrackerSettings:
     estimate_every: int = 1
     """The light is measured in every n-th frame that shows the sheet, and predicted in those between."""
     order: Order = "auto"
-    """Highest order of the light that is measured, from 0 to the sheet's, or `all` of them; `auto` goes by what the data
-    support and the object shows. Blocks of higher orders are not looked at."""
+    """Highest order of the light that is measured, from 0 to the sheet's, or `all` of them. `auto` goes by what the
+    data support and the object shows, and takes all where none is drawn. Blocks of higher orders are not looked at."""
     filtered: bool = True
     """Average over time; without it every frame stands alone."""
     bounces: bool = True

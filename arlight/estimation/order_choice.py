@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.prior import prior_stddev
 from arlight.fourier import frequency_order, pack_real
 
 Array = NDArray[np.float64]
@@ -42,12 +41,6 @@ class Need:
     """(m,) squared change of what is wanted with each part."""
     tolerance: float
     """Share by which a lower order may raise the error."""
-
-    @classmethod
-    def of_coefficients(cls, frequencies: NDArray[np.int64]) -> "Need":
-        """All coefficients for their own sake: no order is left out that the data tell anything about."""
-        spread = prior_stddev(frequencies, 1.0)
-        return cls(np.diag(spread), spread**2, 0.0)
 
 
 class OrderChoice:
