@@ -20,8 +20,8 @@ _IN_TIME = 0.97
 """Share of them that a rung is to make in time."""
 _ROOM = 0.85
 """Share of the budget that a better rung may take before it is tried."""
-_FIRST_LOOK, _LOOK_EVERY = 5, 30
-"""Frames after the start, and after a change, before a better rung is tried."""
+_LOOK_EVERY = 30
+"""Frames after a change before a better rung is tried."""
 _MOST_OWED = 4.0
 """Budgets that late frames may owe: frames are left out for slowness that lasts, not for a single hitch."""
 _LONGEST_DOUBT = 16
@@ -55,9 +55,8 @@ class BudgetController:
         self.ladder = tuple(ladder)
         self._costs = np.array([[rung.estimate_cost, rung.draw_cost] for rung in ladder])
         self._speeds: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
-        # from the cheapest upward: the first frames shall not be late
-        self._place = len(ladder) - 1
-        self._wait = _FIRST_LOOK
+        self._place = 0
+        self._wait = _LOOK_EVERY
         self._doubt = np.ones(len(ladder), int)
         self._owed = 0.0
         self.frames_at = np.zeros(len(ladder), int)
@@ -117,4 +116,4 @@ class BudgetController:
             self._move(self._place - 1)
 
     def _move(self, place: int) -> None:
-        self._place, self._wait = place, _LOOK_EVERY if len(self._speeds) >= _LOOK_EVERY else _FIRST_LOOK
+        self._place, self._wait = place, _LOOK_EVERY

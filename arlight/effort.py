@@ -15,3 +15,5 @@ class Effort:
     """The light is measured in every n-th frame that shows the sheet, and predicted in those between."""
     supersampling: int | None = None
     """Samples along a pixel's side when drawing."""
+    shadow: bool = True
+    """Whether the object casts one."""

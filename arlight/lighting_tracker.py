@@ -182,7 +182,9 @@ class LightingTracker:
         last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
             stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
-            means = self._meter.measure(frame, pose.camera_from_probe, blur_px, stripes, blocks)
+            means = self._meter.measure(
+                frame, pose.camera_from_probe, blur_px, stripes, blocks, self.effort.samples_per_block
+            )
             measured = self._clock()
             estimate = self._estimator.estimate(means, frame.time_s, nuisance, order)
             last = estimate if last is None else estimate.with_stripes_elsewhere(blocks, last.stripes)

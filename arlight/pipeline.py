@@ -6,6 +6,7 @@ from typing import Protocol
 
 from arlight.budget import BudgetController
 from arlight.camera import Camera, Pose
+from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.order_choice import Need
 from arlight.lighting_tracker import BlockEstimator, FrameEstimate, LightingTracker, TrackerSettings
@@ -23,7 +24,7 @@ class FrameRelighter(Protocol):
         """What of the light the object shows; None while that is not known yet."""
 
     def render(
-        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, effort: Effort | None = None
     ) -> Frame:
         """The frame with the lit object in it; the frame itself where pose or light is not known."""
 
@@ -113,7 +114,7 @@ class Pipeline:
         composite = frame
         if self._relighter is not None:
             composite = self._relighter.render(
-                frame, estimate.pose.camera_from_probe, estimate.lighting, estimate.effort.supersampling
+                frame, estimate.pose.camera_from_probe, estimate.lighting, estimate.effort
             )
         render_s = perf_counter() - started
         if self._budget is not None:

@@ -1,6 +1,6 @@
 """Settings that go together: points on the measured front of speed against accuracy."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from arlight.budget import Rung
@@ -50,12 +50,14 @@ PRESETS: dict[PresetName, Preset] = {
 }
 """What `--preset` chooses."""
 
+_LEAN = Effort(samples_per_block=200, supersampling=1)
 LADDER: tuple[Rung, ...] = (
     Rung(Effort(), 1.0, 1.0),
-    Rung(Effort(supersampling=1), 1.0, 0.65),
-    Rung(Effort(samples_per_block=300, supersampling=1), 0.8, 0.65),
-    Rung(Effort(samples_per_block=300, estimate_every=2, supersampling=1), 0.55, 0.65),
-    Rung(Effort(order=3, samples_per_block=300, estimate_every=2, supersampling=1), 0.4, 0.6),
-    Rung(Effort(order=2, samples_per_block=300, estimate_every=4, supersampling=1), 0.3, 0.55),
+    Rung(Effort(supersampling=1), 1.0, 0.88),
+    Rung(_LEAN, 0.85, 0.88),
+    Rung(replace(_LEAN, estimate_every=2), 0.55, 0.88),
+    Rung(replace(_LEAN, estimate_every=4, order=3), 0.35, 0.85),
+    Rung(replace(_LEAN, estimate_every=4, order=3, shadow=False), 0.35, 0.45),
+    Rung(replace(_LEAN, estimate_every=8, order=2, shadow=False), 0.3, 0.42),
 )
 """What a deadline gives up, step by step, from the settings as they are, with what each step costs of the whole."""

@@ -24,16 +24,16 @@ class MarkingRelighter:
 
     def __init__(self, need=None):
         self.calls = []
-        self.samples = []
+        self.efforts = []
         self.releases = 0
         self.need = need
 
     def release(self):
         self.releases += 1
 
-    def render(self, frame, camera_from_probe, lighting, supersampling=None):
+    def render(self, frame, camera_from_probe, lighting, effort=None):
         self.calls.append((frame, camera_from_probe, lighting))
-        self.samples.append(supersampling)
+        self.efforts.append(effort)
         if camera_from_probe is None or lighting is None:
             return frame
         image = np.zeros((240, 320, 3), np.uint8)
@@ -130,7 +130,7 @@ def test_the_effort_that_a_budget_allows_reaches_both_halves(probe, frames):
     pipeline = Pipeline(probe, CAMERA, relighter, budget=budget)
     results = [pipeline.process(frame) for frame in frames]
     assert [result.lighting.order for result in results] == [0] * len(frames)
-    assert relighter.samples == [1] * len(frames)
+    assert relighter.efforts == [effort] * len(frames)
     assert budget.frames_at.sum() == len(frames)
     assert budget.late == 0
 

@@ -47,6 +47,7 @@ def _described(rung: Rung) -> str:
         f"{effort.samples_per_block} samples a block" if effort.samples_per_block is not None else "",
         f"light every {effort.estimate_every} frames" if effort.estimate_every is not None else "",
         f"{effort.supersampling}x{effort.supersampling} samples a pixel" if effort.supersampling is not None else "",
+        "" if effort.shadow else "no shadow",
     ]
     return " and ".join(word for word in words if word) or "everything"
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from arlight.camera import Camera, Pose
 from arlight.commands.options.relighting import RelightingOptions
+from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.order_choice import Need
 from arlight.pipeline import FrameRelighter
@@ -55,9 +56,9 @@ class _PreparedRelighter:
         return self._need.result() if self._need.done() and self._need.exception() is None else None
 
     def render(
-        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, effort: Effort | None = None
     ) -> Frame:
-        return self._made.result().render(frame, camera_from_probe, lighting, supersampling)
+        return self._made.result().render(frame, camera_from_probe, lighting, effort)
 
     def release(self) -> None:
         if self._made.exception() is None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
+from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.order_choice import Need
 from arlight.fourier import orders_up_to, pack_real
@@ -116,7 +117,7 @@ class Relighter:
         self._opened: ObjectDrawer | None = None
 
     def render(
-        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, supersampling: int | None = None
+        self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, effort: Effort | None = None
     ) -> Frame:
         """The frame with the lit object in it.
 
@@ -125,7 +126,7 @@ class Relighter:
             camera_from_probe: the pose; None where the sheet is lost.
             lighting: the light; None before the first estimate. Of the relighter's frequencies it may have the first
                 alone, which costs less.
-            supersampling: samples along a pixel's side; as set by default.
+            effort: limits to the work; none by default.
 
         Returns:
             A new frame; the one given where pose or light is missing: nothing is drawn that is not lit by measurement.
@@ -138,18 +139,24 @@ class Relighter:
             return frame
         if frame.size != self._camera.image_size:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
-        packed = self._packed(lighting)
+        effort, packed = effort or Effort(), self._packed(lighting)
+        view = self._view(camera_from_probe)
+        ratio = self._darkening(packed) if effort.shadow else None
+        shaded = None if ratio is None else self._shadow_region(camera_from_probe, ratio)
+        region = union(None if view is None else view.region, shaded)
+        if region is None:
+            return frame
+        gain = None if ratio is None else self._plane_shader.gain(region, camera_from_probe, ratio)
+        if view is None:
+            return frame.composed(region, gain)
+        return frame.composed(region, gain, self._draw(view, packed, effort.supersampling), view.region)
+
+    def _darkening(self, packed: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(side, side, 4) what the object leaves of the plane's light, faint shadow aside."""
         hidden, open_plane = self._plane_rows.light(packed)
         ratio = irradiance_ratio(hidden, open_plane[:, 0], self.transfer.shadow.grid.side)
         drop_faint(ratio, _FAINT)
-        view = self._view(camera_from_probe)
-        region = union(None if view is None else view.region, self._shadow_region(camera_from_probe, ratio))
-        if region is None:
-            return frame
-        gain = self._plane_shader.gain(region, camera_from_probe, ratio)
-        if view is None:
-            return frame.composed(region, gain)
-        return frame.composed(region, gain, self._draw(view, packed, supersampling), view.region)
+        return ratio
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""

@@ -85,6 +85,7 @@ class BlockKernels:
 
     def __init__(self, layout: BlockLayout, camera: Camera, samples: int) -> None:
         self._count = count = len(layout.half_mm)
+        self._most = samples
         self._layout, self._size = layout, camera.image_size
         n = -(-count // _LANES) * _LANES
         self.flags = np.zeros(n, np.uint8)
@@ -111,6 +112,10 @@ class BlockKernels:
         self._curve: Decoding | None = None
         self._survey, self._measure, self._undistort = _functions()
         shared.rounds = self._prepare_lens(camera)
+
+    def limit(self, samples: int | None) -> None:
+        """Sample a block with fewer pixels than there is room for; None for all."""
+        self._shared.limit = self._most if samples is None else min(samples, self._most)
 
     def place(self, pose: Pose, edge_px: float, blocks: NDArray[np.bool_] | None) -> None:
         """Say where the sheet is and which of its blocks are wanted."""

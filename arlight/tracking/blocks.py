@@ -52,6 +52,7 @@ class BlockMeter:
         blur_px: float = 0.6,
         stripes: Array | None = None,
         blocks: NDArray[np.bool_] | None = None,
+        samples: int | None = None,
     ) -> BlockMeans:
         """Means and harmonics of every block, in linear light.
 
@@ -70,6 +71,7 @@ class BlockMeter:
             CameraError: the frame's size is not the camera's.
         """
         curve = decoding(frame.format.transfer, self._camera.radiometry)
+        self._kernels.limit(samples)
         self._kernels.place(pose, _EDGE_PX + (blur_px if np.isfinite(blur_px) else _UNRESOLVED_BLUR_PX), blocks)
         self._kernels.show(frame, curve)
         if stripes is None and max(frame.format.chroma_shift) > 0:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from arlight.effort import Effort
 from arlight.errors import ProbeError
 from arlight.rendering.default_object import default_object
 from arlight.rendering.mesh import Mesh
@@ -80,6 +81,22 @@ def test_only_the_object_and_its_shadow_change(relighter, pose, lighting_of, env
         assert np.array_equal(mine[far], theirs[far])
     shaded = (after < before - 0.01).all(axis=2) & ~covered
     assert np.count_nonzero(shaded) > 200
+
+
+def test_without_its_shadow_the_object_is_the_same(relighter, pose, lighting_of, environment):
+    frame, lighting = frame_of(), lighting_of(environment)
+    whole = relighter.render(frame, pose, lighting).encoded_rgb()
+    bare = relighter.render(frame, pose, lighting, Effort(shadow=False)).encoded_rgb()
+    region, drawn = relighter.draw_object(pose, lighting)
+    inside = np.zeros(whole.shape[:2], bool)
+    inside[region.y0 : region.y1, region.x0 : region.x1] = drawn[..., 3] == 1.0
+    # chroma at the outline is shared with what lies beside it
+    solid = inside & np.roll(inside, 4, 0) & np.roll(inside, -4, 0) & np.roll(inside, 4, 1) & np.roll(inside, -4, 1)
+    assert np.count_nonzero(solid) > 100
+    np.testing.assert_allclose(bare[solid], whole[solid], atol=1e-3)
+    changed = np.any(bare != frame.encoded_rgb(), axis=2)
+    assert not np.any(changed[: region.y0 - 2])
+    assert np.count_nonzero(np.any(whole != frame.encoded_rgb(), axis=2)) > np.count_nonzero(changed)
 
 
 def test_the_input_frame_stays_as_it_was(relighter, pose, lighting_of, environment):

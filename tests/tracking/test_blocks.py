@@ -276,6 +276,15 @@ def test_fewer_samples_cost_little_and_lend_wider_error_bars(picture, meter):
     np.testing.assert_allclose(sparse.values, full.values, atol=0.003 * level)
 
 
+def test_a_frame_may_be_sampled_with_less_than_there_is_room_for(picture, meter):
+    frame = photograph(picture())
+    full, few, more = (meter.measure(frame, POSE, 0.0, samples=count) for count in (None, 400, 10**9))
+    made = BlockMeter(PROBE, CAMERA, 400).measure(frame, POSE, 0.0)
+    assert few.samples.max() <= 400 < full.samples.max()
+    np.testing.assert_array_equal(few.samples, made.samples)
+    np.testing.assert_array_equal(more.values, full.values)
+
+
 def test_an_unknown_blur_is_no_obstacle(picture, meter):
     means = meter.measure(photograph(picture()), POSE, float("nan"))
     assert np.all(means.valid)
