@@ -28,7 +28,7 @@ def point(name, cost, error, is_preset):
 
 
 def made_up(cost=0.1, error=0.01):
-    ratio = Ratio(Spread(cost, 0.9 * cost, 1.1 * cost, 9), "ArUco + solvePnP", 2.0)
+    ratio = Ratio(Spread(cost, 0.9 * cost, 1.1 * cost, cost, 9), "ArUco + solvePnP", 2.0)
     found = Findings({f"track to filter, {HEADLINE}": ratio}, {"pose": error})
     found.details["front"] = [point("fast", 1.0, 0.05, True), point("order 3", 2.0, 0.03, False)]
     found.details["growth"] = {"order": [{"value": v, "estimate_ms": v, "relight_ms": 1.0} for v in (1, 2, 3)]}

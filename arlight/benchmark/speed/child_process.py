@@ -19,7 +19,7 @@ _LAUNCHER = """
 import os, subprocess, sys
 process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)
 _, status, usage = os.wait4(process.pid, 0)
-print(usage.ru_maxrss)
+print(usage.ru_maxrss, usage.ru_utime + usage.ru_stime)
 sys.exit(os.waitstatus_to_exitcode(status) & 255)
 """
 
@@ -34,6 +34,8 @@ class Finished:
 
     wall_s: float
     """From its start to its end [s]."""
+    cpu_s: float
+    """CPU time of it and its threads [s]."""
     peak_memory_mb: float
     """Most memory that was resident [MB]."""
 
@@ -59,7 +61,8 @@ def run_to_end(command: Sequence[str], environment: Mapping[str, str] | None = N
         raise CommandFailedError(f"{' '.join(command)}: failed ({done.returncode}): {said}")
     # kilobytes, but bytes on macOS
     unit = 2.0**20 if sys.platform == "darwin" else 2.0**10
-    return Finished(wall_s, int(done.stdout.split()[-1]) / unit)
+    peak, cpu_s = done.stdout.split()[-2:]
+    return Finished(wall_s, float(cpu_s), int(peak) / unit)
 
 
 def time_to_lines(

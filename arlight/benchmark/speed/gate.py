@@ -8,7 +8,7 @@ from arlight.benchmark.speed.findings import Findings
 from arlight.errors import ArlightError
 
 SLOWER = 1.3
-"""Factor on a stage's cost relative to its yardstick from which it counts as slower."""
+"""Factor on a stage's cost relative to its yardstick from which it counts as slower, where that is no chance."""
 WORSE = 1.1
 """Factor on an error from which it counts as worse."""
 
@@ -50,7 +50,8 @@ def failures(found: Findings, baseline: Findings) -> list[Failure]:
     failed = []
     for name in ratios:
         now, before = found.ratios[name].value, baseline.ratios[name].value.median
-        if not now.median <= SLOWER * before:
+        # a median that is above by chance is no reason; nan is
+        if not now.least <= SLOWER * before:
             failed.append(Failure(name, before, now.median, SLOWER, (now.low, now.high)))
     for name in errors:
         error, before = found.errors[name], baseline.errors[name]
@@ -76,7 +77,7 @@ def judge(found: Findings, baseline: Findings, again: Callable[[set[str]], Findi
         return []
     second = again(suspected)
     for name in suspected & second.ratios.keys():
-        found.ratios[name] = min(found.ratios[name], second.ratios[name], key=lambda ratio: ratio.value.median)
+        found.ratios[name] = min(found.ratios[name], second.ratios[name], key=lambda ratio: ratio.value.least)
     for name in suspected & second.errors.keys():
         found.errors[name] = min((found.errors[name], second.errors[name]), key=lambda e: e if isfinite(e) else 1e300)
     return failures(found, baseline)

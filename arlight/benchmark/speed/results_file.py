@@ -81,8 +81,8 @@ def load_baseline(name: str) -> Findings:
 
 def _read_ratio(entry: dict[str, Any]) -> Ratio:
     value = entry["value"]
-    lies = Spread(_number(value["median"]), _number(value["low"]), _number(value["high"]), int(value["count"]))
-    return Ratio(lies, str(entry["over"]), _number(entry["cost_ms"]))
+    median, low, high, least = (_number(value[name]) for name in ("median", "low", "high", "least"))
+    return Ratio(Spread(median, low, high, least, int(value["count"])), str(entry["over"]), _number(entry["cost_ms"]))
 
 
 def _number(value: float | None) -> float:

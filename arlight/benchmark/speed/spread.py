@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+_UNSURE = 0.025
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,19 +20,32 @@ class Spread:
     """A tenth of them lie below."""
     high: float
     """A tenth of them lie above."""
+    least: float
+    """What the median of endlessly many would hardly be below: sure to 97.5 %, of fewer than six the smallest one."""
     count: int
     """How many there are."""
 
     def scaled(self, factor: float) -> "Spread":
         """The same in another unit."""
-        return Spread(self.median * factor, self.low * factor, self.high * factor, self.count)
+        return Spread(self.median * factor, self.low * factor, self.high * factor, self.least * factor, self.count)
 
 
 def spread(values: ArrayLike) -> Spread:
     """Median and 10 to 90 % of measurements (n,), n at least 1."""
-    measured = np.asarray(values, float)
+    measured = np.sort(np.asarray(values, float))
     low, median, high = np.percentile(measured, [10.0, 50.0, 90.0])
-    return Spread(float(median), float(low), float(high), len(measured))
+    return Spread(float(median), float(low), float(high), float(measured[_sure_rank(len(measured))]), len(measured))
+
+
+def _sure_rank(count: int) -> int:
+    """Rank from 0 of the value above which the true median lies in 97.5 % of all samples, if there is one.
+
+    Of n values the number below the true median is binomial, (n, 1/2).
+    """
+    below, rank = 0.5**count, 0
+    while rank + 1 < count and (below := below + comb(count, rank + 1) * 0.5**count) <= _UNSURE:
+        rank += 1
+    return rank
 
 
 def block_means(values: Sequence[float], length: int) -> list[float]:

@@ -36,7 +36,7 @@ def findings():
 
     def make(ratios: dict[str, float] | None = None, errors: dict[str, float] | None = None) -> Findings:
         made = {
-            name: Ratio(Spread(value, 0.9 * value, 1.2 * value, 20), "a yardstick", 5.0)
+            name: Ratio(Spread(value, 0.9 * value, 1.2 * value, value, 20), "a yardstick", 5.0)
             for name, value in (ratios or {}).items()
         }
         return Findings(made, dict(errors or {}))

@@ -25,7 +25,7 @@ def never(_names):
 @given(st.dictionaries(NAMES, POSITIVE, min_size=1), st.dictionaries(NAMES, POSITIVE), st.floats(0.1, 1.0))
 def test_what_is_as_good_or_better_passes(ratios, errors, factor):
     def made(scale):
-        kept = {name: Ratio(Spread(scale * v, v, v, 9), "yardstick", 1.0) for name, v in ratios.items()}
+        kept = {name: Ratio(Spread(scale * v, v, v, scale * v, 9), "yardstick", 1.0) for name, v in ratios.items()}
         return Findings(kept, {name: scale * value for name, value in errors.items()})
 
     assert failures(made(factor), made(1.0)) == []
@@ -39,6 +39,15 @@ def test_a_stage_slower_than_allowed_fails_and_one_within_passes(findings):
     assert failure.factor == pytest.approx(1.01 * SLOWER)
     assert failure.scatter is not None
     assert failure.scatter[0] < failure.found < failure.scatter[1]
+
+
+def test_a_median_that_may_be_above_by_chance_passes(findings):
+    def made(least):
+        return Findings({"loop": Ratio(Spread(2.0, 1.0, 3.0, least, 3), "a yardstick", 5.0)})
+
+    baseline = findings({"loop": 1.0})
+    assert failures(made(least=0.99 * SLOWER), baseline) == []
+    assert names(failures(made(least=1.01 * SLOWER), baseline)) == ["loop"]
 
 
 def test_an_error_worse_than_allowed_fails_and_one_within_passes(findings):

@@ -15,6 +15,19 @@ def test_most_of_the_values_lie_between_low_and_high():
     assert found.count == 1000
 
 
+def test_the_true_median_is_hardly_below_the_least():
+    generator = np.random.default_rng(3)
+    for count in (6, 20, 48):
+        # the true median is 1
+        below = [spread(generator.lognormal(size=count)).least > 1.0 for _ in range(4000)]
+        # 0.025 at most; the step to the next rank is wide for few values
+        assert 0.002 < np.mean(below) < 0.031
+
+
+def test_of_a_few_values_the_smallest_is_the_least():
+    assert spread([3.0, 2.0, 5.0, 4.0, 9.0]).least == 2.0
+
+
 def test_a_single_value_is_everything():
     assert spread([3.0]).low == spread([3.0]).median == spread([3.0]).high == 3.0
 
@@ -23,6 +36,7 @@ def test_another_unit_scales_all_of_it():
     in_s, in_ms = spread([0.001, 0.002, 0.004]), spread([1.0, 2.0, 4.0])
     scaled = in_s.scaled(1e3)
     assert (scaled.low, scaled.median, scaled.high) == pytest.approx((in_ms.low, in_ms.median, in_ms.high))
+    assert scaled.least == pytest.approx(in_ms.least)
 
 
 def test_what_slows_both_of_a_pair_leaves_their_ratio():
