@@ -7,8 +7,6 @@
 #ifndef ARLIGHT_BLOCK_CHROMA_H
 #define ARLIGHT_BLOCK_CHROMA_H
 
-#include <complex.h>
-
 #include "block_hue.h"
 #include "block_points.h"
 
@@ -78,34 +76,16 @@ static double kept_by_cells(const Blocks *b, double frequency_x, double frequenc
     return kept;
 }
 
-/* A series of rows as complex coefficients of exp(i k phase), k from -HARMONICS. */
-static void complex_series(const float *rows, double scale, double complex *out)
-{
-    out[HARMONICS] = scale * rows[0];
-    for (int k = 1; k <= HARMONICS; k++) {
-        out[HARMONICS + k] = 0.5 * scale * (rows[2 * k - 1] - I * rows[2 * k]);
-        out[HARMONICS - k] = conj(out[HARMONICS + k]);
-    }
-}
-
-/* Chroma that the block's luma and its hue let expect; luma's finer harmonics, which cells blur, are as predicted. */
+/* Chroma that the block's luma, as far as it was fitted, and its hue let expect. */
 static void expect(const Blocks *b, int block, Chroma *chroma)
 {
-    const float *hue = b->hue + (int64_t)block * HUES * HUE;
-    double complex luma[2 * HARMONICS + 1], tint[2 * HARMONICS + 1], *middle = luma + HARMONICS;
-    complex_series(hue + 2 * HUE, 0.5, luma);
-    middle[0] = chroma->luma[0];
-    middle[1] = 0.5 * (chroma->luma[1] - I * chroma->luma[2]);
-    middle[-1] = conj(middle[1]);
+    const double *y = chroma->luma;
     for (int k = 0; k < 2; k++) {
-        double complex mean = hue[k * HUE + ROWS], swing = 0.0;
-        complex_series(hue + k * HUE, 1.0, tint);
-        for (int j = -HARMONICS; j <= HARMONICS; j++) {
-            mean += middle[j] * tint[HARMONICS - j];
-            swing += j > -HARMONICS ? middle[j] * tint[HARMONICS + 1 - j] : 0.0;
-        }
+        const float *hue = b->hue + (int64_t)block * HUES * HUE + k * HUE;
         double *e = chroma->expected[k];
-        e[0] = creal(mean), e[1] = 2.0 * creal(swing), e[2] = -2.0 * cimag(swing);
+        e[0] = y[0] * hue[0] + 0.5 * (y[1] * hue[1] + y[2] * hue[2]) + hue[ROWS];
+        e[1] = y[0] * hue[1] + y[1] * hue[0] + 0.5 * (y[1] * hue[3] + y[2] * hue[4]);
+        e[2] = y[0] * hue[2] + y[2] * hue[0] + 0.5 * (y[1] * hue[4] - y[2] * hue[3]);
     }
 }
 
