@@ -44,65 +44,38 @@ class VideoReader:
         """The file."""
         self.damage: str | None = None
         """What the last pass over the file could not read, None where it was whole."""
-        self._container = _open(self.path)
+        container = _open(self.path)
         try:
-            self._stream = _picture_stream(self._container)
-            # the first pass goes on from here: to open a file takes as long as some frames
-            self._begun: Iterator[av.VideoFrame] | None = self._pictures(self._container, self._stream)
-            first = self._first_picture(self._begun)
-            self._begun = chain([first], self._begun)
-            self.tags: ColourTags = colour_tags(first)
-            """The stream's colour tags, as they stand in it."""
-            self._location = chroma_location(first)
-            self._layout = (first.width, first.height, first.format.name)
-            self._format = self._pixel_format(first)
-            self.size: tuple[int, int] = self._frame(first, 0).size
-            """Width and height of the upright frames [px]."""
+            stream = _picture_stream(container)
+            # taken down here: a file that was closed may not be asked
+            self.frame_rate: Fraction = stream.average_rate or stream.guessed_rate or FALLBACK_RATE
+            """Average frames per second."""
+            self.time_base: Fraction = stream.time_base or 1 / self.frame_rate
+            """Unit of the stream's times [s]."""
+            pictures = self._pictures(container, stream)
+            first = self._first_picture(pictures)
+            self._describe(container, stream, first)
         except BaseException:
-            self._container.close()
+            container.close()
             raise
+        # the first pass goes on from here: to open a file takes as long as some frames
+        self._begun: tuple[InputContainer, Iterator[av.VideoFrame]] | None = (container, chain([first], pictures))
 
     @property
     def format(self) -> PixelFormat:
         """What the codes of the frames mean, before they are turned upright."""
         return self._format
 
-    @property
-    def frame_rate(self) -> Fraction:
-        """Average frames per second."""
-        return self._stream.average_rate or self._stream.guessed_rate or FALLBACK_RATE
-
-    @property
-    def time_base(self) -> Fraction:
-        """Unit of the stream's times [s]."""
-        return self._stream.time_base or 1 / self.frame_rate
-
-    @property
-    def frame_count(self) -> int | None:
-        """How many frames the file says it has, an estimate; None where it does not say."""
-        if self._stream.frames:
-            return int(self._stream.frames)
-        end = _expected_end_s(self._stream)
-        return round((end - _start_s(self._stream)) * self.frame_rate) or None if end is not None else None
-
-    @property
-    def pixel_aspect(self) -> Fraction | None:
-        """Width of a pixel relative to its height, None where the stream does not say."""
-        return self._stream.codec_context.sample_aspect_ratio or None
-
-    @property
-    def audio_codecs(self) -> list[str]:
-        """The codec of each sound stream."""
-        return [stream.codec_context.codec.canonical_name for stream in self._container.streams.audio]
-
     def __iter__(self) -> Iterator[Frame]:
-        pictures, self._begun = self._begun, None
-        if pictures is not None:
-            yield from self._frames(pictures)
-            return
-        self.damage = None
-        with _open(self.path) as container:
-            yield from self._frames(self._pictures(container, _picture_stream(container)))
+        begun, self._begun = self._begun, None
+        if begun is None:
+            self.damage = None
+            container = _open(self.path)
+            begun = container, self._pictures(container, _picture_stream(container))
+        # a pass has its file to itself, also when the reader is closed meanwhile
+        with begun[0]:
+            for index, picture in enumerate(begun[1]):
+                yield self._frame(picture, index)
 
     def __enter__(self) -> "VideoReader":
         return self
@@ -114,8 +87,24 @@ class VideoReader:
 
     def close(self) -> None:
         """Closes the file; to iterate opens it again."""
-        self._begun = None
-        self._container.close()
+        begun, self._begun = self._begun, None
+        if begun is not None:
+            begun[0].close()
+
+    def _describe(self, container: InputContainer, stream: VideoStream, first: av.VideoFrame) -> None:
+        self.frame_count: int | None = _frame_count(stream, self.frame_rate)
+        """How many frames the file says it has, an estimate; None where it does not say."""
+        self.pixel_aspect: Fraction | None = stream.codec_context.sample_aspect_ratio or None
+        """Width of a pixel relative to its height, None where the stream does not say."""
+        sounds = container.streams.audio
+        self.audio_codecs: list[str] = [sound.codec_context.codec.canonical_name for sound in sounds]
+        """The codec of each sound stream."""
+        self.tags: ColourTags = colour_tags(first)
+        """The stream's colour tags, as they stand in it."""
+        self._layout = (first.width, first.height, first.format.name)
+        self._format = self._pixel_format(first, stream.codec_context.name)
+        self.size: tuple[int, int] = self._frame(first, 0).size
+        """Width and height of the upright frames [px]."""
 
     def _first_picture(self, pictures: Iterator[av.VideoFrame]) -> av.VideoFrame:
         picture = next(pictures, None)
@@ -128,10 +117,6 @@ class VideoReader:
                 f"ffmpeg -i {self.path.name} -vf bwdif progressive.mp4"
             )
         return picture
-
-    def _frames(self, pictures: Iterator[av.VideoFrame]) -> Iterator[Frame]:
-        for index, picture in enumerate(pictures):
-            yield self._frame(picture, index)
 
     def _pictures(self, container: InputContainer, stream: VideoStream) -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
@@ -164,11 +149,10 @@ class VideoReader:
             cut = f"ends at {end_s:.2f} s instead of {expected_s:.2f} s, it is cut off"
             self.damage = f"{self.damage}; {cut}" if self.damage else f"{self.path}: {cut}"
 
-    def _pixel_format(self, picture: av.VideoFrame) -> PixelFormat:
-        name = planar_name(picture.format.name)
-        codec = self._stream.codec_context.name
+    def _pixel_format(self, picture: av.VideoFrame, codec: str) -> PixelFormat:
+        name, location = planar_name(picture.format.name), chroma_location(picture)
         try:
-            return pixel_format(name, self.tags, self._location, (picture.width, picture.height), codec)
+            return pixel_format(name, self.tags, location, (picture.width, picture.height), codec)
         except VideoError as error:
             raise VideoError(f"{self.path}: {error}") from error
 
@@ -222,6 +206,13 @@ def _picture_stream(container: InputContainer) -> VideoStream:
     stream = best if isinstance(best, VideoStream) else container.streams.video[0]
     stream.thread_type, stream.codec_context.thread_count = "AUTO", codec_threads()
     return stream
+
+
+def _frame_count(stream: VideoStream, rate: Fraction) -> int | None:
+    if stream.frames:
+        return int(stream.frames)
+    end = _expected_end_s(stream)
+    return round((end - _start_s(stream)) * rate) or None if end is not None else None
 
 
 def _start_s(stream: VideoStream) -> float:

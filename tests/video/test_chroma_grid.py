@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arlight.video.chroma_grid import axis_grid
@@ -9,6 +9,7 @@ SITES = [(0, 0.0), (1, 0.0), (1, 0.5), (1, 1.0), (1, -0.5), (2, 0.0), (2, 1.5)]
 
 
 @pytest.mark.parametrize(("shift", "offset"), SITES)
+@settings(deadline=None)
 @given(length=st.integers(1, 40))
 def test_both_filters_keep_a_constant(shift, offset, length):
     grid = axis_grid(length, shift, offset)

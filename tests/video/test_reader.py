@@ -119,6 +119,18 @@ def test_every_pass_gives_the_same_frames_also_after_closing(make_clip):
             assert all(np.array_equal(p, q) for p, q in zip(a.planes, b.planes, strict=True))
 
 
+@pytest.mark.parametrize("earlier_passes", [0, 1])
+def test_a_pass_goes_on_when_the_reader_is_closed(make_clip, earlier_passes):
+    with VideoReader(make_clip(frames=30, sound="aac")) as reader:
+        for _ in range(earlier_passes):
+            list(reader)
+        frames = iter(reader)
+        next(frames)
+    assert [frame.index for frame in frames] == list(range(1, 30))
+    assert (reader.frame_rate, reader.time_base.denominator > 0, reader.frame_count) == (30, True, 30)
+    assert (reader.pixel_aspect, reader.audio_codecs) == (None, ["aac"])
+
+
 def test_frames_outlive_the_reader(make_clip):
     clip = make_clip(frames=30)
     kept, _ = frames_of(clip)
