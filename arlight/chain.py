@@ -2,7 +2,7 @@
 
 Between two stages lies a short queue: a slow stage holds up those before it, and nothing piles up. Failure travels both
 ways. Down: it takes its item's place, so what was ahead of it is finished first, and then it is raised where the
-results are taken. Up: a stage that has ended takes nothing more, so those before it end with the item in hand.
+results are taken. Up: a stage that has ended takes nothing more, so those before it end with what they have in hand.
 """
 
 from collections import deque
