@@ -85,7 +85,8 @@ class OrderChoice:
 
         Between looks at all orders not every frame is worth the work.
         """
-        if seen.order < self.highest and time_s - self._learnt_s < _LEARN_EVERY_S:
+        looking = self.order < seen.order == self.highest
+        if not looking and 0.0 <= time_s - self._learnt_s < _LEARN_EVERY_S:
             return
         self._learnt_s = time_s
         measured, strength, unsure = self._by_order(seen)
