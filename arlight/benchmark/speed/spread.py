@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import binom
 
 _UNSURE = 0.025
 
@@ -42,10 +42,7 @@ def _sure_rank(count: int) -> int:
 
     Of n values the number below the true median is binomial, (n, 1/2).
     """
-    below, rank = 0.5**count, 0
-    while rank + 1 < count and (below := below + comb(count, rank + 1) * 0.5**count) <= _UNSURE:
-        rank += 1
-    return rank
+    return max(int(binom.ppf(_UNSURE, count, 0.5)) - 1, 0)
 
 
 def block_means(values: Sequence[float], length: int) -> list[float]:

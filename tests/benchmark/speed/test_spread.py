@@ -24,6 +24,11 @@ def test_the_true_median_is_hardly_below_the_least():
         assert 0.002 < np.mean(below) < 0.031
 
 
+def test_the_least_of_very_many_values_is_close_to_their_median():
+    found = spread(np.arange(20_000.0))
+    assert 0.98 * found.median < found.least < found.median
+
+
 def test_of_a_few_values_the_smallest_is_the_least():
     assert spread([3.0, 2.0, 5.0, 4.0, 9.0]).least == 2.0
 
