@@ -9,6 +9,14 @@ Transfer = Literal["srgb", "bt709", "linear", "gamma22", "gamma28", "hlg"]
 
 HLG_A, HLG_B, HLG_C = 0.17883277, 0.28466892, 0.55991073
 """Constants of the camera curve of hybrid log-gamma (ITU-R BT.2100, table 5)."""
+POWER_CURVES: dict[Transfer, tuple[float, float, float]] = {
+    "srgb": (1.0 / 2.4, 0.055, 0.04045),
+    "bt709": (0.45, 0.099, 0.081),
+    "linear": (1.0, 0.0, 1e-4),
+    "gamma22": (1.0 / 2.2, 0.0, 1e-4),
+    "gamma28": (1.0 / 2.8, 0.0, 1e-4),
+}
+"""(p, b, e) of the curves whose encoded values are (1 + b) L^p - b, and above e, where a straight toe ends."""
 
 
 def linear_from_encoded(encoded: ArrayLike, transfer: Transfer = "srgb") -> NDArray[np.float32]:

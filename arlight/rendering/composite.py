@@ -8,23 +8,21 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.native import Workspace, address, library
 from arlight.rendering.shadow import PlaneGrid
+from arlight.video.dimming import NODE_PX, nodes_of
 from arlight.video.frame import Region
 
 Image = NDArray[np.float32]
 
-_CELL_PX = 8
-"""Between two nodes of the net of rays, as in composite.c: a lens bends what lies between by less than 0.02 px."""
-_NODE_PX = 4
-"""Between two pixels at which the ratio is looked up, as in composite.c."""
 _native = library(__file__, "composite")
-_native.plane_gain.restype = None
-_native.plane_gain.argtypes = [ctypes.c_void_p]
+_native.plane_left.restype = None
+_native.plane_left.argtypes = [ctypes.c_void_p]
 
 
 class _Plane(Workspace):
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("gain", "rays", "ratio", "lines")),
-        *((name, ctypes.c_int64) for name in ("x0", "y0", "width", "height", "node_columns", "side")),
+        *((name, ctypes.c_void_p) for name in ("left", "rays", "ratio", "texels")),
+        *((name, ctypes.c_int64) for name in ("first_row", "first_column", "rows", "columns")),
+        *((name, ctypes.c_int64) for name in ("all_rows", "all_columns", "side")),
         ("texel_from_ray", ctypes.c_double * 9),
     )
 
@@ -39,14 +37,12 @@ class PlaneShader:
             camera: intrinsics.
             grid: where the ratio's texels lie on the plane z = 0.
         """
-        # nodes beyond the last pixel on each side, so that every cell has two
-        x, y = (np.arange(size // _CELL_PX + 2) * float(_CELL_PX) for size in camera.image_size)
+        rows, columns = nodes_of((0, 0, *camera.image_size))
+        x, y = (np.arange(count) * float(NODE_PX) for count in (columns, rows))
         nodes = np.stack(np.meshgrid(x, y), axis=-1)
-        rays = camera.rays(nodes.reshape(-1, 2)).astype(np.float32)
-        self._plane = _Plane(node_columns=len(x), side=grid.side)
-        lines = np.empty((3, camera.image_size[0] // _NODE_PX + 2, 4), np.float32)
-        self._plane.hold({"rays": rays, "lines": lines})
-        self._buffer = np.empty(0, np.float32)
+        rays = np.ascontiguousarray(camera.rays(nodes.reshape(-1, 2)).T, np.float32)
+        self._plane = _Plane(all_rows=rows, all_columns=columns, side=grid.side)
+        self._plane.hold({"rays": rays, "texels": np.empty((2, columns), np.float32)})
         self._texel_from_plane = np.array(
             [
                 [1.0 / grid.texel_mm, 0.0, -grid.corner_mm[0] / grid.texel_mm - 0.5],
@@ -55,36 +51,31 @@ class PlaneShader:
             ]
         )
 
-    def gain(self, region: Region, camera_from_probe: Pose, ratio: Image) -> Image:
-        """What the light of every pixel is multiplied by: the ratio at the point of the plane that it sees.
+    def left(self, region: Region, camera_from_probe: Pose, ratio: Image) -> Image:
+        """What the object leaves of every pixel's light: the ratio at the point of the plane that it sees.
 
         Args:
-            region: pixels of the frame.
+            region: pixels of the frame, as `Frame.dimmed` takes it.
             camera_from_probe: the pose.
             ratio: (side, side, 4) irradiance with the object over irradiance without, and an unused column.
 
         Returns:
-            (h, w, 3) of the region, 1 where no point of the map is seen; overwritten by the next call.
+            (3, rows, columns) at every 4th pixel, as `Frame.dimmed` takes it; 1 where no point of the map is seen.
         """
         rotation, plane = camera_from_probe.rotation, self._plane
         if ratio.shape != (plane.side, plane.side, 4):
             raise ValueError(f"expected a ratio of {plane.side} texels a side, found {ratio.shape}")
-        gain = self._room(*region.size)
+        rows, columns = nodes_of(region)
+        left = np.empty((3, rows, columns), np.float32)
         homography = np.column_stack([rotation[:, 0], rotation[:, 1], camera_from_probe.translation])
         try:
             texel_from_ray = self._texel_from_plane @ np.linalg.inv(homography)
         except np.linalg.LinAlgError:
-            gain.fill(1.0)  # seen edge-on the plane has no pixels
-            return gain
+            left.fill(1.0)  # seen edge-on the plane has no pixels
+            return left
         plane.texel_from_ray[:] = texel_from_ray.reshape(-1).tolist()
-        plane.x0, plane.y0 = region.x0, region.y0
-        plane.width, plane.height = region.size
-        plane.gain, plane.ratio = address(gain, np.float32), address(ratio, np.float32)
-        _native.plane_gain(ctypes.byref(plane))
-        return gain
-
-    def _room(self, width: int, height: int) -> Image:
-        """Memory that was touched before: to get it afresh for every frame takes longer than to fill it."""
-        if self._buffer.size <= 3 * width * height:
-            self._buffer = np.empty(3 * width * height + 1, np.float32)
-        return self._buffer[: 3 * width * height].reshape(height, width, 3)
+        plane.first_row, plane.first_column = region.y0 // NODE_PX, region.x0 // NODE_PX
+        plane.rows, plane.columns = rows, columns
+        plane.left, plane.ratio = address(left, np.float32), address(ratio, np.float32)
+        _native.plane_left(ctypes.byref(plane))
+        return left

@@ -117,15 +117,6 @@ def project(camera: Camera, camera_from_probe: Pose, points_mm: ArrayLike) -> Pr
     return Projector(camera).project(camera_from_probe, points_mm)
 
 
-def union(first: Region | None, second: Region | None) -> Region | None:
-    """The smallest region that holds both."""
-    if first is None or second is None:
-        return first or second
-    return Region(
-        min(first.x0, second.x0), min(first.y0, second.y0), max(first.x1, second.x1), max(first.y1, second.y1)
-    )
-
-
 def _corner_radius(camera: Camera) -> float:
     width, height = camera.image_size
     corners = [[0.0, 0.0], [width - 1.0, 0.0], [0.0, height - 1.0], [width - 1.0, height - 1.0]]

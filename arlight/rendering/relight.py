@@ -18,7 +18,7 @@ from arlight.rendering.composite import PlaneShader
 from arlight.rendering.gloss import gloss_rows
 from arlight.rendering.light_rows import LightRows
 from arlight.rendering.mesh import Mesh
-from arlight.rendering.projection import Projector, View, union
+from arlight.rendering.projection import Projector, View
 from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.refinement import refined
@@ -26,6 +26,7 @@ from arlight.rendering.settings import RelightSettings
 from arlight.rendering.shadow import dark_texels, drop_faint, irradiance_ratio
 from arlight.rendering.transfer_cache import kept_transfer
 from arlight.rendering.visibility import Progress
+from arlight.video.dimming import node_box
 from arlight.video.frame import Frame, Region
 
 _FAINT = 0.008
@@ -141,15 +142,18 @@ class Relighter:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
         effort, packed = effort or Effort(), self._packed(lighting)
         view = self._view(camera_from_probe)
-        ratio = self._darkening(packed) if effort.shadow else None
-        shaded = None if ratio is None else self._shadow_region(camera_from_probe, ratio)
-        region = union(None if view is None else view.region, shaded)
+        if effort.shadow:
+            frame = self._shaded(frame, camera_from_probe, packed)
+        return frame if view is None else frame.covered(view.region, self._draw(view, packed, effort.supersampling))
+
+    def _shaded(self, frame: Frame, camera_from_probe: Pose, packed: NDArray[np.float32]) -> Frame:
+        """The frame with the shadow on the plane."""
+        ratio = self._darkening(packed)
+        region = self._shadow_region(camera_from_probe, ratio)
         if region is None:
             return frame
-        gain = None if ratio is None else self._plane_shader.gain(region, camera_from_probe, ratio)
-        if view is None:
-            return frame.composed(region, gain)
-        return frame.composed(region, gain, self._draw(view, packed, effort.supersampling), view.region)
+        region = Region(*node_box(region, frame.size))
+        return frame.dimmed(region, self._plane_shader.left(region, camera_from_probe, ratio))
 
     def _darkening(self, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         """(side, side, 4) what the object leaves of the plane's light, faint shadow aside."""

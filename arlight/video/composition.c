@@ -1,12 +1,10 @@
-/* Sets light into a region of a picture: what was there times a gain, then covered by a layer. Only the pixels that
-   this changes, and those that share chroma with them, are read and written. */
+/* Covers a region of a picture with a layer of light. Only the pixels that this changes, and those that share chroma
+   with them, are read and written. */
 #include "averaging.h"
 #include "rows.h"
 
 /* Linear light within this of what a pixel had is no change: a thirtieth of an 8-bit level in the dark. */
 #define UNCHANGED 1e-5f
-/* A gain within this of 1 is none: a fifth of a 10-bit level near white. */
-#define NO_GAIN 5e-4f
 /* Pixels that are looked at together. */
 #define BLOCK 16
 /* Lines of new light: red, green, blue, and its luma. */
@@ -18,32 +16,20 @@ EXPORT const int32_t composing_lines = ROW_LINES + AVERAGING_LINES + LIGHT_LINES
 struct span { int32_t x0, x1; };
 
 /* New light of a region of the picture. */
-struct layers {
-    const float *gain;          /* (h, w, 3) of `box`, NULL for none */
-    const float *over;          /* (h, w, 4) of `over_box`: light times coverage, and coverage; NULL for none */
-    struct box box, over_box;   /* the latter inside of the former */
+struct layer {
+    const float *over;          /* (h, w, 4) light times coverage, and coverage */
+    struct box box;
 };
 
 /* What a composition works with. */
 struct composition {
-    const struct layers *layers;
+    const struct layer *layer;
     const struct picture *to;
     struct rows rows;           /* of the region around: the pixels that share chroma with it included */
     struct averaging averaging;
-    struct span *changed;       /* (rows of the region around) pixels that the layers may change */
+    struct span *changed;       /* (rows of the region around) pixels that the layer may change */
     float *light[3], *luma;     /* (width of the region around) */
 };
-
-/* Whether a gain differs from 1 among `count` numbers. */
-static HOT int gains(const float *gain, int32_t count)
-{
-    float most = 0.0f;
-    for (int32_t i = 0; i < count; i++) {
-        float change = fabsf(gain[i] - 1.0f);
-        most = change > most ? change : most;
-    }
-    return most > NO_GAIN;
-}
 
 /* Whether anything is covered among `count` pixels. */
 static HOT int covers(const float *over, int32_t count)
@@ -54,40 +40,25 @@ static HOT int covers(const float *over, int32_t count)
     return most > 0.0f;
 }
 
-/* The pixels of a row, in whole blocks, beside which none of `width` is marked by `any`. */
-static struct span marked_span(int (*any)(const float *, int32_t), const float *line, int32_t channels, int32_t width)
-{
-    int32_t first = 0, end = width, numbers = channels == 3 ? 3 : 1;
-    while (first < end && !any(line + channels * first, numbers * (end - first < BLOCK ? end - first : BLOCK)))
-        first += BLOCK;
-    while (end > first && !any(line + channels * (end - first < BLOCK ? first : end - BLOCK),
-                               numbers * (end - first < BLOCK ? end - first : BLOCK)))
-        end -= BLOCK;
-    return first < end ? (struct span){first, end} : (struct span){width, 0};
-}
-
 static inline struct span joined(struct span a, struct span b)
 {
     return (struct span){a.x0 < b.x0 ? a.x0 : b.x0, a.x1 > b.x1 ? a.x1 : b.x1};
 }
 
-/* The pixels of a row that the layers may change; empty where its end is not beyond its first. */
-static struct span changed_span(const struct layers *layers, int32_t y)
+/* The pixels of a row, in whole blocks, that the layer may change; empty where its end is not beyond its first. */
+static struct span changed_span(const struct layer *layer, int32_t y)
 {
-    struct box box = layers->box, over = layers->over_box;
-    struct span span = {box.x1, box.x0};
-    if (layers->gain && y >= box.y0 && y < box.y1) {
-        int32_t width = box.x1 - box.x0;
-        struct span found = marked_span(gains, layers->gain + (ptrdiff_t)(y - box.y0) * 3 * width, 3, width);
-        span = joined(span, (struct span){box.x0 + found.x0, box.x0 + found.x1});
-    }
-    if (layers->over && y >= over.y0 && y < over.y1) {
-        int32_t width = over.x1 - over.x0;
-        struct span found = marked_span(covers, layers->over + (ptrdiff_t)(y - over.y0) * 4 * width, 4, width);
-        if (found.x0 < found.x1)
-            span = joined(span, (struct span){over.x0 + found.x0, over.x0 + found.x1});
-    }
-    return span;
+    struct box box = layer->box;
+    int32_t width = box.x1 - box.x0, first = 0, end = width;
+    if (y < box.y0 || y >= box.y1)
+        return (struct span){box.x1, box.x0};
+    const float *line = layer->over + (ptrdiff_t)(y - box.y0) * 4 * width;
+    while (first < end && !covers(line + 4 * first, end - first < BLOCK ? end - first : BLOCK))
+        first += BLOCK;
+    while (end > first && !covers(line + 4 * (end - first < BLOCK ? first : end - BLOCK),
+                                  end - first < BLOCK ? end - first : BLOCK))
+        end -= BLOCK;
+    return first < end ? (struct span){box.x0 + first, box.x0 + end} : (struct span){box.x1, box.x0};
 }
 
 /* The changed pixels of the rows first <= y < end together, those that lie in the region around. */
@@ -99,22 +70,6 @@ static struct span changed_in_rows(const struct composition *work, int32_t first
     for (int32_t y = first; y < end && y < around.y1; y++)
         span = joined(span, work->changed[y - around.y0]);
     return span;
-}
-
-/* Old light times its gain. */
-static HOT void multiply(const float *restrict gain, float *const *old, int32_t count, float *restrict red,
-                         float *restrict green, float *restrict blue, float *restrict changed)
-{
-    const float *r = old[0], *g = old[1], *b = old[2];
-    for (int32_t i = 0; i < count; i++) {
-        float x = fabsf(gain[3 * i] - 1.0f), y = fabsf(gain[3 * i + 1] - 1.0f), z = fabsf(gain[3 * i + 2] - 1.0f);
-        float most = x > y ? x : y;
-        most = most > z ? most : z;
-        changed[i] = (float)(most > NO_GAIN);
-        red[i] = r[i] * gain[3 * i];
-        green[i] = g[i] * gain[3 * i + 1];
-        blue[i] = b[i] * gain[3 * i + 2];
-    }
 }
 
 /* Covers light with a layer. */
@@ -174,8 +129,7 @@ static HOT void recode(const float *matrix, float *const *rgb, const float *rest
 /* New light of a span of a row, and which pixels change. */
 static void light_span(struct composition *work, int32_t y, struct span span, float *changed)
 {
-    const struct layers *layers = work->layers;
-    struct box box = layers->box, over = layers->over_box;
+    struct box box = work->layer->box;
     int32_t at = span.x0 - work->rows.box.x0, width = span.x1 - span.x0;
     float *old[3], *light[3];
     for (int k = 0; k < 3; k++) {
@@ -183,14 +137,8 @@ static void light_span(struct composition *work, int32_t y, struct span span, fl
         light[k] = work->light[k] + at;
         memcpy(light[k], old[k], (size_t)width * sizeof(float));
     }
-    if (layers->gain)
-        multiply(layers->gain + 3 * ((ptrdiff_t)(y - box.y0) * (box.x1 - box.x0) + span.x0 - box.x0), old, width,
-                 light[0], light[1], light[2], changed);
-    if (layers->over && y >= over.y0 && y < over.y1) {
-        int32_t x0 = clamped(over.x0, span.x0, span.x1), x1 = clamped(over.x1, x0, span.x1), to = x0 - span.x0;
-        cover(layers->over + 4 * ((ptrdiff_t)(y - over.y0) * (over.x1 - over.x0) + x0 - over.x0), x1 - x0,
-              light[0] + to, light[1] + to, light[2] + to, changed + to);
-    }
+    const float *over = work->layer->over + 4 * ((ptrdiff_t)(y - box.y0) * (box.x1 - box.x0) + span.x0 - box.x0);
+    cover(over, width, light[0], light[1], light[2], changed);
     confirm(old, light, width, changed);
 }
 
@@ -257,12 +205,12 @@ static void write_chroma(struct composition *work, int32_t r)
     }
 }
 
-/* Sets layers into `to`, a copy of `from`. `around` is their box with the pixels that share a chroma sample with it,
+/* Sets a layer into `to`, a copy of `from`. `around` is its box with the pixels that share a chroma sample with it,
    `changed` has room for a span a row of it. */
-EXPORT void compose_layers(const struct layout *layout, const struct picture *from, const struct picture *to,
-                           const struct layers *layers, const struct box *around, struct span *changed, float *scratch)
+EXPORT void cover_picture(const struct layout *layout, const struct picture *from, const struct picture *to,
+                          const struct layer *layer, const struct box *around, struct span *changed, float *scratch)
 {
-    struct composition work = {.layers = layers, .to = to, .changed = changed};
+    struct composition work = {.layer = layer, .to = to, .changed = changed};
     int32_t line = around->x1 - around->x0 + LINE_MARGIN;
     int32_t wide = 2 * layout->columns.share, high = 2 * layout->rows.share;
     rows_begin(&work.rows, layout, from, *around, 1, scratch);
@@ -271,7 +219,7 @@ EXPORT void compose_layers(const struct layout *layout, const struct picture *fr
     for (int k = 0; k < 3; k++)
         work.light[k] = work.luma + (k + 1) * line;
     for (int32_t y = around->y0; y < around->y1; y++)
-        changed[y - around->y0] = changed_span(layers, y);
+        changed[y - around->y0] = changed_span(layer, y);
     for (int32_t y = around->y0; y < around->y1; y++) {
         struct span span = changed_in_rows(&work, y - high, y + high + 1);
         if (span.x0 < span.x1)

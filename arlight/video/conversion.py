@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from arlight.native import library
 from arlight.video.curves import IDENTITY, TABLE_SIZE, Curve, decoding_table, encoding_table
-from arlight.video.layout import POINTERS, BoxBounds, CurveTable, LayersOfLight, Layout, PictureCodes, layout_of
+from arlight.video.layout import POINTERS, BoxBounds, CurveTable, LayerOfLight, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
 
 __all__ = [
-    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "composed", "converted", "decoding_table",
+    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "converted", "covered", "decoding_table",
     "encoded_rgb", "encoding_table", "full_range_luma", "linear_luma", "linear_rgb", "with_chroma",
 ]  # fmt: skip
 
@@ -37,14 +37,14 @@ _resampling = library(__file__, "resampling")
 _colour.read_colour.argtypes = [_LAYOUT, _PICTURE, _BOX, c_int32, _CURVE, c_void_p, c_void_p]
 _colour.read_luma.argtypes = [_LAYOUT, _PICTURE, _BOX, _CURVE, c_void_p]
 _colour.read_bytes.argtypes = [_LAYOUT, _PICTURE, c_int32, c_void_p, c_int32, c_int32, c_void_p, c_void_p]
-_composition.compose_layers.argtypes = [
-    _LAYOUT, _PICTURE, _PICTURE, POINTERS[LayersOfLight], _BOX, c_void_p, c_void_p,
+_composition.cover_picture.argtypes = [
+    _LAYOUT, _PICTURE, _PICTURE, POINTERS[LayerOfLight], _BOX, c_void_p, c_void_p,
 ]  # fmt: skip
 _resampling.convert_colour.argtypes = [
     _LAYOUT, _PICTURE, _LAYOUT, _PICTURE, _BOX, c_int32, c_void_p, c_void_p, c_void_p,
 ]  # fmt: skip
 for _function in (
-    _colour.read_colour, _colour.read_luma, _colour.read_bytes, _composition.compose_layers, _resampling.convert_colour,
+    _colour.read_colour, _colour.read_luma, _colour.read_bytes, _composition.cover_picture, _resampling.convert_colour,
 ):  # fmt: skip
     _function.restype = None
 _READING_LINES = c_int32.in_dll(_colour, "reading_lines").value
@@ -100,29 +100,22 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
     return (planes[0], neutral, neutral), colour
 
 
-def composed(
-    planes: Planes, format_: PixelFormat, box: Box, gain: FloatImage | None, over: FloatImage | None, over_box: Box
-) -> Planes:
-    """Planes with the light of a region times a gain, then covered by a layer, rounded to the nearest codes.
+def covered(planes: Planes, format_: PixelFormat, box: Box, over: FloatImage) -> Planes:
+    """Planes with a layer laid over a region, rounded to the nearest codes.
 
     Args:
         box: the region [px].
-        gain: (h, w, 3) of the region; None for 1.
-        over: light times coverage, and coverage (h, w, 4) of `over_box`; None for nothing.
-        over_box: inside the region [px].
+        over: light times coverage, and coverage (h, w, 4).
     """
     out = tuple(plane.copy() for plane in planes)
     if box[0] < box[2] and box[1] < box[3]:
         around = _with_shared_chroma(box, planes[0].shape, format_)
         scratch = _scratch(around, _COMPOSING_LINES)
         spans = np.empty((around[3] - around[1], 2), np.int32)
-        layers = LayersOfLight(
-            None if gain is None else gain.ctypes.data, None if over is None else over.ctypes.data, BoxBounds(*box),
-            BoxBounds(*over_box),
-        )  # fmt: skip
-        _composition.compose_layers(
+        layer = LayerOfLight(over.ctypes.data, BoxBounds(*box))
+        _composition.cover_picture(
             byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(PictureCodes.of(out)),
-            byref(layers), byref(BoxBounds(*around)), spans.ctypes.data, scratch.ctypes.data,
+            byref(layer), byref(BoxBounds(*around)), spans.ctypes.data, scratch.ctypes.data,
         )  # fmt: skip
     return out
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arlight.color import Transfer
-from arlight.video import conversion
+from arlight.video import conversion, dimming
 from arlight.video.conversion import FloatImage, Planes
 from arlight.video.pixel_format import PixelFormat
 
@@ -118,38 +118,47 @@ class Frame:
             A frame in the same format; a grey frame becomes 4:2:0 colour.
         """
         inside = self._inside(region)
-        image = _image(linear, inside, 3, "linear")
+        image = _image(linear, (*inside.size[::-1], 3), "linear")
         opaque = np.concatenate([image, np.ones((*image.shape[:2], 1), np.float32)], axis=2)
-        return self.composed(inside, over=opaque)
+        return self.covered(inside, opaque)
 
-    def composed(
-        self,
-        region: Region,
-        gain: ArrayLike | None = None,
-        over: ArrayLike | None = None,
-        over_region: Region | None = None,
-    ) -> "Frame":
-        """The frame with the light of a region changed; where it does not, codes stay bit by bit.
+    def covered(self, region: Region, over: ArrayLike) -> "Frame":
+        """The frame with a layer of light laid over a region; what it does not change keeps its codes bit by bit.
 
         Args:
             region: rectangle inside the picture [px].
-            gain: (h, w, 3) that the linear light of the region is multiplied by; 1 by default.
-            over: (h, w, 4) linear light times coverage, and coverage in [0, 1], that is then laid over it.
-            over_region: where, a rectangle inside the region [px]; all of it by default.
+            over: (h, w, 4) linear light times coverage, and coverage in [0, 1].
 
         Returns:
             A frame in the same format; a grey frame becomes 4:2:0 colour.
         """
         inside = self._inside(region)
-        covered = inside if over_region is None else Region(*over_region)
-        if over is not None and covered.joined(inside) != inside:
-            raise ValueError(f"over_region {tuple(covered)} leaves the region {tuple(inside)}")
-        factors = None if gain is None else _image(gain, inside, 3, "gain")
-        layer = None if over is None else _image(over, covered, 4, "over")
+        layer = _image(over, (*inside.size[::-1], 4), "over")
         planes, format_ = conversion.with_chroma(self.planes, self.format)
-        return replace(
-            self, planes=conversion.composed(planes, format_, inside, factors, layer, covered), format=format_
-        )
+        return replace(self, planes=conversion.covered(planes, format_, inside, layer), format=format_)
+
+    def dimmed(self, region: Region, left: ArrayLike) -> "Frame":
+        """The frame with only a share of its light left in a region; where all is left, codes stay bit by bit.
+
+        Args:
+            region: rectangle inside the picture, its edges at multiples of 4 pixels or at the picture's own [px].
+            left: (3, rows, columns) share of red, green and blue linear light, clamped to [0, 1], at every 4th pixel
+                from the region's first, one beyond its last: interpolated between.
+
+        Returns:
+            A frame in the same format, right to a code or so; a grey frame becomes 4:2:0 colour.
+        """
+        inside = self._inside(region)
+        if dimming.node_box(inside, self.size) != inside:
+            raise ValueError(f"the region's edges must be at multiples of {dimming.NODE_PX}, found {tuple(inside)}")
+        share = _image(left, (3, *dimming.nodes_of(inside)), "left")
+        planes, format_ = conversion.with_chroma(self.planes, self.format)
+        if not dimming.is_direct(format_):
+            return self.with_linear_rgb(inside, dimming.dimmed_light(planes, format_, inside, share))
+        out = tuple(plane.copy() for plane in planes)
+        if min(inside.size) > 0:
+            dimming.dim(out, format_, inside, share)
+        return replace(self, planes=out, format=format_)
 
     def converted(self, target: PixelFormat) -> "Frame":
         """The frame in another Y'CbCr format of the same transfer, for an encoder that cannot take its own."""
@@ -164,10 +173,9 @@ class Frame:
         return region
 
 
-def _image(values: ArrayLike, region: Region, channels: int, name: str) -> FloatImage:
-    """Values (h, w, channels) of a region as compiled code takes them."""
+def _image(values: ArrayLike, shape: tuple[int, ...], name: str) -> FloatImage:
+    """Values as compiled code takes them."""
     image = np.ascontiguousarray(values, np.float32)
-    expected = (*region.size[::-1], channels)
-    if image.shape != expected:
-        raise ValueError(f"{name} must be (h, w, {channels}) = {expected}, found {image.shape}")
+    if image.shape != shape:
+        raise ValueError(f"{name} must be {shape}, found {image.shape}")
     return image

@@ -70,13 +70,13 @@ class BoxBounds(Structure):
     _fields_ = (("x0", c_int32), ("y0", c_int32), ("x1", c_int32), ("y1", c_int32))
 
 
-class LayersOfLight(Structure):
-    """`struct layers` of composition.c: new light of a region."""
+class LayerOfLight(Structure):
+    """`struct layer` of composition.c: new light of a region."""
 
-    _fields_ = (("gain", c_void_p), ("over", c_void_p), ("box", BoxBounds), ("over_box", BoxBounds))
+    _fields_ = (("over", c_void_p), ("box", BoxBounds))
 
 
-POINTERS = {kind: POINTER(kind) for kind in (Layout, PictureCodes, BoxBounds, CurveTable, LayersOfLight)}
+POINTERS = {kind: POINTER(kind) for kind in (Layout, PictureCodes, BoxBounds, CurveTable, LayerOfLight)}
 
 
 @lru_cache(maxsize=16)

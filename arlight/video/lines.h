@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "codes.h"
 #include "picture.h"
 
 /* Floats that a line of scratch memory is longer than the region is wide: what chroma at its edges averages. */
@@ -49,14 +50,6 @@ static void look_up(struct curve curve, const int32_t *restrict step, const floa
         float before = curve.values[step[i]];
         out[i] = before + (curve.values[step[i] + 1] - before) * share[i];
     }
-}
-
-/* The nearest code to a number; what is no number becomes 0. */
-INLINE int32_t nearest_code(float value, float zero, float span, float top)
-{
-    float code = value * span + (zero + 0.5f);
-    code = code > 0.0f ? code : 0.0f;
-    return (int32_t)(code < top ? code : top);
 }
 
 /* Adds a weighted line to a sum. */

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 from arlight.camera import Camera, Pose
 from arlight.rendering.composite import PlaneShader
@@ -11,8 +12,13 @@ NODE_PX = 4
 
 
 def shade_plane(linear, region, camera, pose, grid, ratio):
+    """Multiply light (h, w, 3) of a region by what is left of it, interpolated between nodes by another library."""
     padded = np.concatenate([ratio, np.zeros((*ratio.shape[:2], 1))], axis=2).astype(np.float32)
-    linear *= PlaneShader(camera, grid).gain(region, pose, padded)
+    left = PlaneShader(camera, grid).left(region, pose, padded)
+    y, x = (np.arange(size) / NODE_PX for size in linear.shape[:2])
+    nodes = tuple(np.arange(count) for count in left.shape[1:])
+    points = np.stack(np.meshgrid(y, x, indexing="ij"), axis=-1)
+    linear *= RegularGridInterpolator(nodes, np.moveaxis(left, 0, 2))(points).astype(np.float32)
 
 
 def ramp_ratio(grid):
@@ -25,8 +31,8 @@ def ramp_ratio(grid):
 def test_every_pixel_takes_the_ratio_of_the_point_it_sees(request, which, pose):
     camera = request.getfixturevalue(which)
     grid = PlaneGrid((-50.0, -50.0), 2.0, 50)
-    region = Region(100, 80, 230, 170)
-    linear = np.full((90, 130, 3), 0.8, np.float32)
+    region = Region(100, 80, 232, 172)
+    linear = np.full((92, 132, 3), 0.8, np.float32)
     shade_plane(linear, region, camera, pose, grid, ramp_ratio(grid).astype(np.float32))
     for place in ([0.0, 0.0], [20.0, -17.0], [-31.0, 12.0]):
         x, y = np.rint(camera.project(pose, [[*place, 0.0]])[0]).astype(int)
@@ -89,11 +95,11 @@ def test_every_pixel_of_a_bent_picture_sees_the_plane_where_the_lens_says(camera
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e30])
 def test_impossible_poses_and_edges_of_the_map_touch_no_foreign_memory(camera, pose, bad):
     grid = PlaneGrid((-10.0, -10.0), 1.0, 20)
-    linear = np.ones((50, 60, 3), np.float32)
+    linear = np.ones((52, 60, 3), np.float32)
     for broken in (
         Pose(pose.rotation, np.array([0.0, bad, 300.0])),
         Pose(np.full((3, 3), bad), pose.translation),
         Pose(np.zeros((3, 3)), np.zeros(3)),
     ):
-        shade_plane(linear, Region(7, 9, 67, 59), camera, broken, grid, np.ones((20, 20, 3)))
+        shade_plane(linear, Region(8, 8, 68, 60), camera, broken, grid, np.ones((20, 20, 3)))
     assert np.all(linear == 1.0)

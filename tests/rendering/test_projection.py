@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from arlight.camera import Pose
-from arlight.rendering.projection import project, union
+from arlight.rendering.projection import project
 from arlight.video.frame import Region
 
 
@@ -56,11 +56,3 @@ def test_a_lens_does_not_fold_far_points_back_into_the_frame(lens_camera, pose):
     pixels = project(lens_camera, pose, far).pixels
     assert pixels[0, 0] > 320
     assert np.allclose(pixels[1], lens_camera.project(pose, far[1:])[0])
-
-
-def test_union_of_regions():
-    a, b = Region(1, 2, 5, 6), Region(3, 0, 9, 4)
-    assert union(a, b) == Region(1, 0, 9, 6)
-    assert union(None, b) == b
-    assert union(a, None) == a
-    assert union(None, None) is None
