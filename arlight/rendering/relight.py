@@ -27,7 +27,7 @@ from arlight.rendering.shadow import dark_texels, drop_faint, irradiance_ratio
 from arlight.rendering.transfer_cache import kept_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.dimming import node_box
-from arlight.video.frame import Frame, Region
+from arlight.video.frame import Frame, Layer, Region, Shade
 
 _FAINT = 0.008
 """A shadow that takes less than this share of the light is below one 8-bit level, and pixels of less are left alone."""
@@ -141,19 +141,19 @@ class Relighter:
         if frame.size != self._camera.image_size:
             raise ValueError(f"the camera is for frames of {self._camera.image_size} pixels, found {frame.size}")
         effort, packed = effort or Effort(), self._packed(lighting)
+        shade = self._shade(frame, camera_from_probe, packed) if effort.shadow else None
         view = self._view(camera_from_probe)
-        if effort.shadow:
-            frame = self._shaded(frame, camera_from_probe, packed)
-        return frame if view is None else frame.covered(view.region, self._draw(view, packed, effort.supersampling))
+        layer = None if view is None else Layer(view.region, self._draw(view, packed, effort.supersampling))
+        return frame if shade is None and layer is None else frame.composed(shade, layer)
 
-    def _shaded(self, frame: Frame, camera_from_probe: Pose, packed: NDArray[np.float32]) -> Frame:
-        """The frame with the shadow on the plane."""
+    def _shade(self, frame: Frame, camera_from_probe: Pose, packed: NDArray[np.float32]) -> Shade | None:
+        """The shadow on the plane."""
         ratio = self._darkening(packed)
         region = self._shadow_region(camera_from_probe, ratio)
         if region is None:
-            return frame
+            return None
         region = Region(*node_box(region, frame.size))
-        return frame.dimmed(region, self._plane_shader.left(region, camera_from_probe, ratio))
+        return Shade(region, self._plane_shader.left(region, camera_from_probe, ratio))
 
     def _darkening(self, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         """(side, side, 4) what the object leaves of the plane's light, faint shadow aside."""

@@ -15,7 +15,7 @@ from arlight.video.layout import POINTERS, BoxBounds, CurveTable, LayerOfLight, 
 from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
 
 __all__ = [
-    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "converted", "covered", "decoding_table",
+    "TABLE_SIZE", "Box", "FloatImage", "Plane", "Planes", "Upsampling", "converted", "cover", "decoding_table",
     "encoded_rgb", "encoding_table", "full_range_luma", "linear_luma", "linear_rgb", "with_chroma",
 ]  # fmt: skip
 
@@ -100,24 +100,40 @@ def with_chroma(planes: Planes, format_: PixelFormat) -> tuple[Planes, PixelForm
     return (planes[0], neutral, neutral), colour
 
 
-def covered(planes: Planes, format_: PixelFormat, box: Box, over: FloatImage) -> Planes:
-    """Planes with a layer laid over a region, rounded to the nearest codes.
+def cover(planes: Planes, format_: PixelFormat, box: Box, over: FloatImage) -> None:
+    """Lay light over a region of writable planes, rounded to the nearest codes.
 
     Args:
         box: the region [px].
         over: light times coverage, and coverage (h, w, 4).
     """
-    out = tuple(plane.copy() for plane in planes)
-    if box[0] < box[2] and box[1] < box[3]:
-        around = _with_shared_chroma(box, planes[0].shape, format_)
-        scratch = _scratch(around, _COMPOSING_LINES)
-        spans = np.empty((around[3] - around[1], 2), np.int32)
-        layer = LayerOfLight(over.ctypes.data, BoxBounds(*box))
-        _composition.cover_picture(
-            byref(_layout(planes, format_)), byref(PictureCodes.of(planes)), byref(PictureCodes.of(out)),
-            byref(layer), byref(BoxBounds(*around)), spans.ctypes.data, scratch.ctypes.data,
-        )  # fmt: skip
-    return out
+    if min(box[2] - box[0], box[3] - box[1]) == 0:
+        return
+    around = _with_shared_chroma(box, planes[0].shape, format_)
+    before, rows = _rows_before(planes, format_, around)
+    scratch = _scratch(around, _COMPOSING_LINES)
+    spans = np.empty((around[3] - around[1], 2), np.int32)
+    _composition.cover_picture(
+        byref(_layout(planes, format_)), byref(before), byref(PictureCodes.of(planes)),
+        byref(LayerOfLight(over.ctypes.data, BoxBounds(*box))), byref(BoxBounds(*around)), spans.ctypes.data,
+        scratch.ctypes.data,
+    )  # fmt: skip
+    del rows
+
+
+def _rows_before(planes: Planes, format_: PixelFormat, box: Box) -> tuple[PictureCodes, Planes]:
+    """A copy of the rows that a region's colour is read from, told as if it were all of the picture, and its memory."""
+    _, first, _, end = _with_shared_chroma(box, planes[0].shape, format_)
+    shift = format_.chroma_shift[1]
+    tops = (first, first >> shift, first >> shift)
+    rows = tuple(
+        plane[top : top + ((end - first) >> (shift if k else 0)) + 1].copy()
+        for k, (plane, top) in enumerate(zip(planes, tops, strict=True))
+    )
+    codes = PictureCodes.of(rows)
+    for k, top in enumerate(tops):
+        codes.planes[k] -= top * codes.strides[k]
+    return codes, rows
 
 
 def converted(planes: Planes, format_: PixelFormat, target: PixelFormat) -> Planes:

@@ -6,7 +6,7 @@ import numpy as np
 
 from arlight.color import POWER_CURVES
 from arlight.native import Workspace, address, library
-from arlight.video.conversion import Box, FloatImage, Planes, linear_rgb
+from arlight.video.conversion import Box, FloatImage, Planes, cover, linear_rgb
 from arlight.video.layout import POINTERS, BoxBounds, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import PixelFormat
 
@@ -44,36 +44,38 @@ def node_box(box: Box, size: tuple[int, int]) -> Box:
     )  # fmt: skip
 
 
-def is_direct(format_: PixelFormat) -> bool:
-    """Whether pictures of a format can be dimmed without bringing them to linear light."""
-    return format_.transfer in POWER_CURVES and max(format_.chroma_shift) <= 1 and format_.plane_count == 3
-
-
 def dim(planes: Planes, format_: PixelFormat, box: Box, left: FloatImage) -> None:
-    """Dim a region of a picture in place.
+    """Take light away from a region of writable planes.
 
     Args:
-        planes: writable, of a format that `is_direct`.
         box: the region [px], as `node_box` makes it.
-        left: (3, rows, columns) share of red, green and blue light that is left at the nodes.
+        left: (3, rows, columns) share of red, green and blue linear light that is left at the nodes.
     """
+    if min(box[2] - box[0], box[3] - box[1]) == 0:
+        return
+    if format_.transfer in POWER_CURVES and max(format_.chroma_shift) <= 1:
+        _dim_codes(planes, format_, box, left)
+        return
+    light = linear_rgb(planes, format_, box) * _at_pixels(box, np.clip(np.nan_to_num(left, nan=1.0), 0.0, 1.0))
+    cover(planes, format_, box, np.concatenate([light, np.ones_like(light[..., :1])], axis=2))
+
+
+def _dim_codes(planes: Planes, format_: PixelFormat, box: Box, left: FloatImage) -> None:
     power, lowered, toe = POWER_CURVES[format_.transfer]
     rows, columns = nodes_of(box)
     across, down = (1 << shift for shift in format_.chroma_shift)
-    bounds = BoxBounds(*box)
-    dimming = _Dimming(address(left, np.float32), rows, columns, bounds, across, down, toe, lowered, 1.0 / power - 2.0)
+    shared = BoxBounds(*box), across, down, toe, lowered, 1.0 / power - 2.0
+    dimming = _Dimming(address(left, np.float32), rows, columns, *shared)
     dimming.hold({"scratch": np.empty(_SCRATCH * columns, np.float32)})
     height, width = planes[0].shape
     _native.dim_picture(byref(layout_of((width, height), format_)), byref(PictureCodes.of(planes)), byref(dimming))
 
 
-def dimmed_light(planes: Planes, format_: PixelFormat, box: Box, left: FloatImage) -> FloatImage:
-    """Linear light (h, w, 3) of a region times what is left of it, for any format."""
-    share = np.clip(np.nan_to_num(left, nan=1.0), 0.0, 1.0)
+def _at_pixels(box: Box, left: FloatImage) -> FloatImage:
+    """(h, w, 3) between the nodes."""
     x0, y0, x1, y1 = box
-    for axis, count in ((1, y1 - y0), (2, x1 - x0)):
-        node, part = np.divmod(np.arange(count), NODE_PX)
-        weight = (part / np.float32(NODE_PX)).reshape((-1, 1) if axis == 1 else -1)
-        before, after = share.take(node, axis), share.take(node + 1, axis)
-        share = before + weight.astype(np.float32) * (after - before)
-    return linear_rgb(planes, format_, box) * np.moveaxis(share, 0, 2)
+    (row, down), (column, across) = (np.divmod(np.arange(count), NODE_PX) for count in (y1 - y0, x1 - x0))
+    part = (down / NODE_PX).astype(np.float32)[:, None]
+    lines = left[:, row] + part * (left[:, row + 1] - left[:, row])
+    part = (across / NODE_PX).astype(np.float32)
+    return np.moveaxis(lines[..., column] + part * (lines[..., column + 1] - lines[..., column]), 0, 2)

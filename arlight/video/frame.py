@@ -39,6 +39,25 @@ class Region(NamedTuple):
         return Region(x0, y0, max(x0, min(self.x1, size[0])), max(y0, min(self.y1, size[1])))
 
 
+class Shade(NamedTuple):
+    """Light taken away from a part of a picture."""
+
+    region: Region
+    """Its edges at multiples of 4 pixels, or at the picture's own [px]."""
+    left: FloatImage
+    """(3, rows, columns) share of red, green and blue linear light that is left, clamped to [0, 1], at every 4th pixel
+    from the region's first, one beyond its last: interpolated between."""
+
+
+class Layer(NamedTuple):
+    """Light laid over a part of a picture."""
+
+    region: Region
+    """Any [px]."""
+    over: FloatImage
+    """(h, w, 4) linear light times coverage, and coverage in [0, 1]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One picture, immutable: the planes are read-only views, copies only where rows are not contiguous."""
@@ -120,45 +139,29 @@ class Frame:
         inside = self._inside(region)
         image = _image(linear, (*inside.size[::-1], 3), "linear")
         opaque = np.concatenate([image, np.ones((*image.shape[:2], 1), np.float32)], axis=2)
-        return self.covered(inside, opaque)
+        return self.composed(layer=Layer(inside, opaque))
 
-    def covered(self, region: Region, over: ArrayLike) -> "Frame":
-        """The frame with a layer of light laid over a region; what it does not change keeps its codes bit by bit.
+    def composed(self, shade: Shade | None = None, layer: Layer | None = None) -> "Frame":
+        """The frame with light taken away, and then with light laid over it; what that leaves keeps its codes.
 
         Args:
-            region: rectangle inside the picture [px].
-            over: (h, w, 4) linear light times coverage, and coverage in [0, 1].
+            shade: what is left of the light of a region; right to a code or so.
+            layer: light that covers a region.
 
         Returns:
             A frame in the same format; a grey frame becomes 4:2:0 colour.
         """
-        inside = self._inside(region)
-        layer = _image(over, (*inside.size[::-1], 4), "over")
         planes, format_ = conversion.with_chroma(self.planes, self.format)
-        return replace(self, planes=conversion.covered(planes, format_, inside, layer), format=format_)
-
-    def dimmed(self, region: Region, left: ArrayLike) -> "Frame":
-        """The frame with only a share of its light left in a region; where all is left, codes stay bit by bit.
-
-        Args:
-            region: rectangle inside the picture, its edges at multiples of 4 pixels or at the picture's own [px].
-            left: (3, rows, columns) share of red, green and blue linear light, clamped to [0, 1], at every 4th pixel
-                from the region's first, one beyond its last: interpolated between.
-
-        Returns:
-            A frame in the same format, right to a code or so; a grey frame becomes 4:2:0 colour.
-        """
-        inside = self._inside(region)
-        if dimming.node_box(inside, self.size) != inside:
-            raise ValueError(f"the region's edges must be at multiples of {dimming.NODE_PX}, found {tuple(inside)}")
-        share = _image(left, (3, *dimming.nodes_of(inside)), "left")
-        planes, format_ = conversion.with_chroma(self.planes, self.format)
-        if not dimming.is_direct(format_):
-            return self.with_linear_rgb(inside, dimming.dimmed_light(planes, format_, inside, share))
-        out = tuple(plane.copy() for plane in planes)
-        if min(inside.size) > 0:
-            dimming.dim(out, format_, inside, share)
-        return replace(self, planes=out, format=format_)
+        planes = tuple(plane.copy() for plane in planes)
+        if shade is not None:
+            region = self._inside(shade.region)
+            if dimming.node_box(region, self.size) != region:
+                raise ValueError(f"the shade's edges must be at multiples of {dimming.NODE_PX}, found {tuple(region)}")
+            dimming.dim(planes, format_, region, _image(shade.left, (3, *dimming.nodes_of(region)), "left"))
+        if layer is not None:
+            region = self._inside(layer.region)
+            conversion.cover(planes, format_, region, _image(layer.over, (*region.size[::-1], 4), "over"))
+        return replace(self, planes=planes, format=format_)
 
     def converted(self, target: PixelFormat) -> "Frame":
         """The frame in another Y'CbCr format of the same transfer, for an encoder that cannot take its own."""

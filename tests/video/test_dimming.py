@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 
 from arlight.color import encoded_from_linear
 from arlight.video.dimming import NODE_PX, node_box, nodes_of
-from arlight.video.frame import Frame, Region
+from arlight.video.frame import Frame, Region, Shade
 from arlight.video.pixel_format import PixelFormat
 
 YUV420 = PixelFormat("bt709", False, 8, (1, 1), (0.0, 0.5))
@@ -66,7 +66,7 @@ def test_dimmed_is_linear_light_times_the_share(name, size):
     frame, region = picture(FORMATS[name], size), Region(8, 4, *size)
     left = shares(region)
     expected = frame.with_linear_rgb(region, frame.linear_rgb(region) * at_pixels(region, left))
-    for apart in codes_apart(frame.dimmed(region, left), expected):
+    for apart in codes_apart(frame.composed(Shade(region, left)), expected):
         assert apart.max() <= 1.0
         assert apart.mean() < 0.2
 
@@ -78,7 +78,7 @@ def test_every_level_is_right_to_a_code_from_black_to_white(transfer):
     frame = Frame.from_rgb(np.repeat(ramp[..., None], 3, axis=2), transfer=transfer)
     for share in (0.05, 0.3, 0.5, 0.8, 0.97):
         region = frame.full_region
-        found = frame.dimmed(region, np.full((3, *nodes_of(region)), share))
+        found = frame.composed(Shade(region, np.full((3, *nodes_of(region)), share)))
         expected = 255.0 * encoded_from_linear(share * frame.linear_rgb()[0, :, 0], transfer)
         assert np.abs(found.planes[0][3] - expected).max() < 0.75
         assert all(np.array_equal(plane, found.planes[0]) for plane in found.planes)
@@ -92,13 +92,13 @@ def test_nothing_taken_away_changes_no_code(name):
     frame = Frame(0, 0.0, planes, format_)
     left = np.ones((3, *nodes_of(frame.full_region)))
     left[0, 2, 3], left[1, 5, 5], left[2, 7] = np.nan, 1.5, np.inf
-    assert max(apart.max() for apart in codes_apart(frame.dimmed(frame.full_region, left), frame)) == 0.0
+    assert max(apart.max() for apart in codes_apart(frame.composed(Shade(frame.full_region, left)), frame)) == 0.0
 
 
 @pytest.mark.parametrize("name", ["420", "422", "444 full", "rgb"])
 def test_without_light_all_is_black(name):
     frame = picture(FORMATS[name])
-    dark = frame.dimmed(frame.full_region, np.zeros((3, *nodes_of(frame.full_region))))
+    dark = frame.composed(Shade(frame.full_region, np.zeros((3, *nodes_of(frame.full_region)))))
     assert np.all(dark.linear_rgb() < 1e-3)
 
 
@@ -106,7 +106,8 @@ def test_shares_multiply():
     frame = picture(YUV420)
     region = frame.full_region
     first, second = np.full((3, *nodes_of(region)), 0.6), shares(region)
-    twice, once = frame.dimmed(region, first).dimmed(region, second), frame.dimmed(region, first * second)
+    twice = frame.composed(Shade(region, first)).composed(Shade(region, second))
+    once = frame.composed(Shade(region, first * second))
     assert max(apart.max() for apart in codes_apart(twice, once)) <= 1.0
 
 
@@ -114,7 +115,7 @@ def test_only_the_region_is_touched_and_the_frame_itself_stays():
     frame = picture(YUV420)
     before = [plane.copy() for plane in frame.planes]
     region = Region(16, 8, 40, 24)
-    found = frame.dimmed(region, np.full((3, *nodes_of(region)), 0.5))
+    found = frame.composed(Shade(region, np.full((3, *nodes_of(region)), 0.5)))
     for scale, old, new, kept in zip((1, 2, 2), before, found.planes, frame.planes, strict=True):
         changed = np.zeros(old.shape, bool)
         changed[8 // scale : 24 // scale, 16 // scale : 40 // scale] = True
@@ -125,7 +126,7 @@ def test_only_the_region_is_touched_and_the_frame_itself_stays():
 
 def test_grey_stays_grey_and_becomes_colour_only_in_its_format():
     grey = Frame(0, 0.0, (np.full((16, 24), 120, np.uint8),), PixelFormat("gray", True, 8))
-    found = grey.dimmed(grey.full_region, np.full((3, *nodes_of(grey.full_region)), 0.5))
+    found = grey.composed(Shade(grey.full_region, np.full((3, *nodes_of(grey.full_region)), 0.5)))
     assert found.format.plane_count == 3
     assert np.all(found.planes[1] == 128)
     assert np.all(found.planes[0] == found.planes[0][0, 0])
@@ -134,11 +135,11 @@ def test_grey_stays_grey_and_becomes_colour_only_in_its_format():
 def test_regions_and_shares_that_do_not_fit_are_refused():
     frame = picture(YUV420)
     with pytest.raises(ValueError, match="multiples of 4"):
-        frame.dimmed(Region(2, 4, 20, 20), np.ones((3, 5, 6)))
+        frame.composed(Shade(Region(2, 4, 20, 20), np.ones((3, 5, 6))))
     with pytest.raises(ValueError, match="left must be"):
-        frame.dimmed(Region(4, 4, 20, 20), np.ones((3, 4, 5)))
+        frame.composed(Shade(Region(4, 4, 20, 20), np.ones((3, 4, 5))))
     with pytest.raises(ValueError, match="leaves the picture"):
-        frame.dimmed(Region(80, 4, 96, 20), np.ones((3, 5, 5)))
+        frame.composed(Shade(Region(80, 4, 96, 20), np.ones((3, 5, 5))))
 
 
 def test_the_box_of_nodes_holds_the_region_and_stays_in_the_picture():

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from arlight.color import encoded_from_linear, linear_from_encoded
-from arlight.video.frame import Frame, Region
+from arlight.video.frame import Frame, Layer, Region
 from arlight.video.pixel_format import PixelFormat, chroma_offset_px
 
 YUV420 = PixelFormat("bt709", False, 8, (1, 1), (0.0, 0.5))
@@ -216,7 +216,7 @@ def test_a_layer_covers_the_light(name):
     frame, region = random_frame(FORMATS[name], size=(90, 41)), Region(7, 5, 84, 36)
     over = layer_of(region)
     linear = frame.linear_rgb(region) * (1 - over[..., 3:]) + over[..., :3]
-    expected, found = frame.with_linear_rgb(region, linear), frame.covered(region, over)
+    expected, found = frame.with_linear_rgb(region, linear), frame.composed(layer=Layer(region, over))
     for a, b in zip(expected.planes, found.planes, strict=True):
         # the same numbers but for the last digit of a product: few lie that near to the middle of two codes
         assert np.abs(a.astype(int) - b).max() <= 1
@@ -227,9 +227,9 @@ def test_a_layer_covers_the_light(name):
 def test_a_layer_that_changes_nothing_changes_no_code(name):
     frame, region = random_frame(FORMATS[name], size=(90, 41), spread=0.98), Region(0, 0, 90, 41)
     over = np.zeros((41, 90, 4))
-    assert same_codes(frame.covered(region, over), frame)
+    assert same_codes(frame.composed(layer=Layer(region, over)), frame)
     over[30, 70], over[8, 9] = np.nan, (np.nan, 0.2, 0.2, 1.0)
-    assert same_codes(frame.covered(region, over), frame)
+    assert same_codes(frame.composed(layer=Layer(region, over)), frame)
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -239,7 +239,7 @@ def test_a_single_changed_pixel_is_where_it_belongs(name):
     for x, y in ((0, 0), (69, 39), (33, 17), (34, 18), (0, 20), (50, 0)):
         over = np.zeros((40, 70, 4))
         over[y, x] = (0.9, 0.05, 0.4, 1.0)
-        changed = frame.covered(frame.full_region, over)
+        changed = frame.composed(layer=Layer(frame.full_region, over))
         rows, columns = np.nonzero(changed.planes[0] != frame.planes[0])
         assert set(zip(columns.tolist(), rows.tolist(), strict=True)) == {(x, y)}
         for before, after in zip(frame.planes[1:], changed.planes[1:], strict=True):
@@ -247,16 +247,16 @@ def test_a_single_changed_pixel_is_where_it_belongs(name):
             (sx, sy), (ox, oy) = format_.chroma_shift, format_.chroma_offset_px
             assert np.all(np.abs((columns << sx) + ox - x) < (1 << sx))
             assert np.all(np.abs((rows << sy) + oy - y) < (1 << sy))
-        one = frame.covered(Region(x, y, x + 1, y + 1), over[y : y + 1, x : x + 1])
+        one = frame.composed(layer=Layer(Region(x, y, x + 1, y + 1), over[y : y + 1, x : x + 1]))
         assert same_codes(one, changed)
 
 
 def test_a_layer_of_the_wrong_shape_is_refused():
     frame = random_frame(YUV420)
     with pytest.raises(ValueError, match="over must be"):
-        frame.covered(Region(4, 4, 20, 20), np.ones((16, 16, 3)))
+        frame.composed(layer=Layer(Region(4, 4, 20, 20), np.ones((16, 16, 3))))
     with pytest.raises(ValueError, match="leaves the picture"):
-        frame.covered(Region(30, 4, 40, 8), np.ones((4, 10, 4)))
+        frame.composed(layer=Layer(Region(30, 4, 40, 8), np.ones((4, 10, 4))))
 
 
 def test_grey_reads_as_equal_channels_and_becomes_colour_when_written():
