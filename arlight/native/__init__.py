@@ -2,7 +2,7 @@
 
 `X.c` of a folder is built into `libX.so` beside it when the package is installed (`build`), and loaded by `library`.
 What Python and C share is a structure of pointers to arrays that Python owns; it is filled once, so that a call costs
-no conversion. Calls release the interpreter's lock.
+no conversion. Calls release the interpreter's lock, unless they are so short that to get it back would take longer.
 """
 
 import ctypes
@@ -17,19 +17,20 @@ from arlight.errors import InstallationError
 __all__ = ["Workspace", "address", "library"]
 
 
-def library(source: str, name: str) -> ctypes.CDLL:
+def library(source: str, name: str, keeps_lock: bool = False) -> ctypes.CDLL:
     """The library built from `name`.c beside a Python file.
 
     Args:
         source: the Python file's `__file__`.
         name: of the C file, without its suffix.
+        keeps_lock: whether calls keep the interpreter's lock: for what takes some 50 microseconds at most.
 
     Raises:
         InstallationError: it was not built, or for another machine.
     """
     path = Path(source).with_name(f"lib{name}.so")
     try:
-        return ctypes.CDLL(str(path))
+        return (ctypes.PyDLL if keeps_lock else ctypes.CDLL)(str(path))
     except OSError as error:
         raise InstallationError(
             f"{path}: the compiled part of arlight cannot be loaded ({error}); "

@@ -2,12 +2,14 @@
 #ifndef ARLIGHT_BOUNDED_H
 #define ARLIGHT_BOUNDED_H
 
-static inline float lesser(float value, float other)
+#include "native.h"
+
+INLINE float lesser(float value, float other)
 {
     return value < other ? value : other;
 }
 
-static inline float greater(float value, float other)
+INLINE float greater(float value, float other)
 {
     return value > other ? value : other;
 }

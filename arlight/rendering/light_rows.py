@@ -1,4 +1,4 @@
-"""Rows that light multiplies: stored coefficient by coefficient, so that fewer coefficients cost less."""
+"""Rows that light multiplies: stored in blocks, coefficient by coefficient, so that fewer coefficients cost less."""
 
 import ctypes
 from collections.abc import Sequence
@@ -10,13 +10,17 @@ from arlight.native import address, library
 
 Rows = NDArray[np.float32]
 
-_light = library(__file__, "light").light_rows
+_BLOCK = 32
+"""Rows of a block, as in light.c."""
+_LARGEST = 32767
+"""Code of a row's largest value."""
+_light = library(__file__, "light", keeps_lock=True).light_rows
 _light.restype = None
-_light.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p]
+_light.argtypes = [*[ctypes.c_void_p] * 2, *[ctypes.c_int64] * 2, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p]
 
 
 class LightRows:
-    """Several matrices of rows, stacked. Not for two threads at once."""
+    """Several matrices of rows, stacked; kept in 16 bits, of each row's largest value. Not for two threads at once."""
 
     def __init__(self, parts: Sequence[ArrayLike], independent: ArrayLike | None = None) -> None:
         """Stack matrices.
@@ -33,9 +37,15 @@ class LightRows:
         if independent is not None:
             triangle = np.asarray(independent, float)
             stacked, self._parts_of = stacked @ triangle.astype(np.float32), np.linalg.inv(triangle)
-        self._rows = np.ascontiguousarray(stacked.T)
-        self._lit = np.empty((3, self._ends[-1]), np.float32)
-        self._rows_address, self._lit_address = (address(array, np.float32) for array in (self._rows, self._lit))
+        blocks, self._count = -(-len(stacked) // _BLOCK), stacked.shape[1]
+        # coefficients are taken in units in which they do as much as each other, so that rounding harms none more
+        self._unit = np.sqrt(np.mean(stacked**2, axis=0, dtype=float))[:, None]
+        codes, scale = _coded(stacked / np.maximum(self._unit.T, np.finfo(np.float32).tiny).astype(np.float32), blocks)
+        self._lit = np.zeros((blocks * _BLOCK, 4), np.float32)
+        self._held = codes, scale
+        self._rows = (address(codes, np.int16), address(scale, np.float32), blocks, self._count)
+        self._lit_address = address(self._lit, np.float32)
+        self._last = b""
 
     def light(self, coefficients: Rows) -> list[Rows]:
         """Rows times coefficients, by the first of them.
@@ -44,16 +54,31 @@ class LightRows:
             coefficients: (k, 3) real-packed, k at most m.
 
         Returns:
-            For each part (3, n), a view that holds until the next call.
+            For each part (n, 4), three colours and 0, a view that holds until the next call.
         """
         given = np.asarray(coefficients)
-        if given.ndim != 2 or given.shape[1] != 3 or len(given) > len(self._rows):
-            raise ValueError(f"coefficients must be (k, 3), k at most {len(self._rows)}, found {given.shape}")
+        if given.ndim != 2 or given.shape[1] != 3 or len(given) > self._count:
+            raise ValueError(f"coefficients must be (k, 3), k at most {self._count}, found {given.shape}")
         k = len(given)
         # the triangle's inverse is one too, and its corner inverts the triangle's corner
         known = given if self._parts_of is None else self._parts_of[:k, :k] @ given
-        factors = np.ascontiguousarray(known, np.float32)
-        total = self._lit.shape[1]
-        _light(self._rows_address, total, address(factors, np.float32), k, self._lit_address)
+        factors = np.ascontiguousarray(known * self._unit[:k], np.float32)
+        # what was predicted or kept from the last frame is the same light
+        content = factors.tobytes()
+        if content != self._last:
+            _light(*self._rows, address(factors, np.float32), k, self._lit_address)
+            self._last = content
         starts = [0, *self._ends[:-1]]
-        return [self._lit[:, start:end] for start, end in zip(starts, self._ends, strict=True)]
+        return [self._lit[start:end] for start, end in zip(starts, self._ends, strict=True)]
+
+
+def _coded(rows: Rows, blocks: int) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
+    """Codes (blocks, m, BLOCK) of rows (n, m), and their scales as light.c has them."""
+    scale = np.zeros(blocks * _BLOCK, np.float32)
+    scale[: len(rows)] = np.abs(rows).max(axis=1) / np.float32(_LARGEST)
+    codes = np.zeros((blocks * _BLOCK, rows.shape[1]), np.int16)
+    codes[: len(rows)] = np.rint(rows / np.maximum(scale[: len(rows), None], np.finfo(np.float32).tiny))
+    # sums of even rows are of the upper half of 32 bits
+    apart = scale.reshape(-1, 8, 2) * np.array([2.0**-16, 1.0], np.float32)
+    blocked = codes.reshape(blocks, _BLOCK, -1).transpose(0, 2, 1)
+    return np.ascontiguousarray(blocked), np.ascontiguousarray(apart.transpose(0, 2, 1))

@@ -1,169 +1,216 @@
 /* Draws lit triangles: the nearest one at every sample, its corners' radiance interpolated in perspective. */
 #include "native.h"
+#include "samples.h"
 #include "texture.h"
 #include "triangle.h"
 
-enum { CORNER = 12 }; /* columns of a corner, as in raster.py */
+#include <string.h>
 
-typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
+typedef struct {
+    float x, y;        /* whole numbers: place in 1 / SNAP of a sample */
+    float u, v;        /* texture coordinates over the depth */
+    float radiance[3]; /* over the depth; of the body alone where it has a texture */
+    float nearness;    /* 1 / depth, 0 where the corner is not to be drawn */
+} Corner;
 
 typedef struct {
     const float *pixels;   /* (n, 2) where the vertices are seen in the frame [px] */
     const float *depth_mm; /* (n,) along the optical axis */
-    const float *body;     /* (3, n) radiance of each vertex's matte body */
-    const float *mirrored; /* (3, n) and of its gloss */
+    const float *body;     /* (n, 4) radiance of each vertex's matte body */
+    const float *mirrored; /* (n, 4) and of its gloss */
     const int32_t *faces;  /* (face_count, 3), counter-clockwise from outside */
     const float *texture_place; /* (n, 3) u, v, layer; null without textures */
-    float *corners;        /* (n, CORNER) x, y in samples; u, v, body, 1, gloss, each over the depth; layer */
-    float *nearness;       /* (height, width) 1 / depth of what is drawn, 0 where nothing is */
-    float *radiance;       /* (height, width, 4) red, green, blue, 1; means nothing where nothing is drawn */
+    Corner *corners;       /* (n,) */
+    Samples samples;       /* of the region */
     int64_t vertex_count, face_count;
     int64_t closed;        /* whether faces that are turned away cannot be seen */
-    int64_t width, height; /* samples of the region */
-    int64_t samples;       /* along a pixel's side */
+    int64_t side;          /* samples along a pixel's side */
     Texture texture;
     double left_px, top_px, near_mm;
 } Raster;
 
 /* Vertices in samples of the region; those before the near plane, and what is too far aside, get no nearness. */
-static inline void place_corners(const Raster *r)
+INLINE void place_corners(const Raster *r)
 {
-    float scale = (float)r->samples, nearest = (float)r->near_mm;
+    float scale = (float)r->side * SNAP, nearest = (float)r->near_mm, middle = 0.5f * SNAP;
     float left = (float)r->left_px - 0.5f, top = (float)r->top_px - 0.5f;
-    int64_t n = r->vertex_count;
-    for (int64_t i = 0; i < n; i++) {
-        float x = snapped((r->pixels[2 * i] - left) * scale - 0.5f);
-        float y = snapped((r->pixels[2 * i + 1] - top) * scale - 0.5f);
-        int drawn = (r->depth_mm[i] > nearest) & (fabsf(x) < MOST_SAMPLES) & (fabsf(y) < MOST_SAMPLES);
+    /* without a texture between them body and gloss are one */
+    float share = r->texture_place ? 0.0f : 1.0f;
+    for (int64_t i = 0; i < r->vertex_count; i++) {
+        float x = rintf((r->pixels[2 * i] - left) * scale - middle);
+        float y = rintf((r->pixels[2 * i + 1] - top) * scale - middle);
+        int drawn = (r->depth_mm[i] > nearest) & (fabsf(x) < FARTHEST) & (fabsf(y) < FARTHEST);
         float nearness = drawn ? 1.0f / r->depth_mm[i] : 0.0f;
-        float *corner = r->corners + CORNER * i;
-        corner[0] = x, corner[1] = y, corner[7] = nearness;
-        for (int c = 0; c < 3; c++) {
-            float body = r->body[c * n + i] * nearness, mirrored = r->mirrored[c * n + i] * nearness;
-            /* without a texture between them they are one */
-            corner[4 + c] = r->texture_place ? body : body + mirrored;
-            corner[8 + c] = mirrored;
-        }
-        if (r->texture_place) {
-            const float *place = r->texture_place + 3 * i;
-            corner[2] = place[0] * nearness, corner[3] = place[1] * nearness, corner[11] = place[2];
-        }
+        Four light = *(const Four *)(r->body + 4 * i) + share * *(const Four *)(r->mirrored + 4 * i);
+        light[3] = 1.0f;
+        Corner *corner = r->corners + i;
+        corner->x = x, corner->y = y, corner->u = corner->v = 0.0f;
+        *(Four *)corner->radiance = light * nearness;
     }
-}
-
-/* One row of a triangle: what is nearer than before replaces it. `value` is radiance / depth and 1 / depth. */
-static inline void fill(const Raster *r, int64_t place, int count, Four value, Four step)
-{
-    float *nearness = r->nearness + place;
-    Four *radiance = (Four *)r->radiance + place;
-    /* rows are a few samples long: several at once would wait for each other's stores */
-    for (int i = 0; i < count; i++) {
-        Four here = value + (float)i * step;
-        if (here[3] > nearness[i]) {
-            nearness[i] = here[3];
-            radiance[i] = here / here[3];
-        }
-    }
-}
-
-/* The same with a texture on the body. `place` is u, v over the depth, `gloss` the mirrored radiance over it. */
-static inline void fill_textured(
-    const Raster *r, const Picture *picture, int64_t at, int count, const Four value[3], const Four step[3])
-{
-    float *nearness = r->nearness + at;
-    Four *radiance = (Four *)r->radiance + at;
-    for (int i = 0; i < count; i++) {
-        Four body = value[1] + (float)i * step[1];
-        if (body[3] > nearness[i]) {
-            Four place = value[0] + (float)i * step[0], gloss = value[2] + (float)i * step[2];
-            float depth = 1.0f / body[3];
-            Four colour = {0.0f, 0.0f, 0.0f, 1.0f};
-            look_up(&r->texture, picture, place[2] * depth, place[3] * depth, (float *)&colour);
-            nearness[i] = body[3];
-            gloss[3] = 0.0f;
-            radiance[i] = (body * colour + gloss) * depth;
-        }
-    }
-}
-
-/* How many pixels of the finest texture lie in a sample. */
-static inline float texture_pixels(const Texture *texture, const float *a, const float *b, const float *c, float area)
-{
-    float u[3] = {a[2] / a[7], b[2] / b[7], c[2] / c[7]}, v[3] = {a[3] / a[7], b[3] / b[7], c[3] / c[7]};
-    return fabsf(twice_area(u, v) / area) * (float)(texture->width * texture->height);
-}
-
-static inline void draw_triangle(const Raster *r, const float *a, const float *b, const float *c)
-{
-    float x[3] = {a[0], b[0], c[0]}, y[3] = {a[1], b[1], c[1]}, area = twice_area(x, y);
-    Rows rows;
-    if (!begin_rows(&rows, x, y, (int)r->height))
-        return;
-    /* the body alone, or texture coordinates and gloss around it */
-    int first = r->texture_place ? 0 : 1, last = r->texture_place ? 2 : 1;
-    Four across[3], down[3];
-    float inverse = 1.0f / area, b_across = (y[2] - y[0]) * inverse, c_across = (y[1] - y[0]) * inverse;
-    float b_down = (x[2] - x[0]) * inverse, c_down = (x[1] - x[0]) * inverse;
-    for (int k = first; k <= last; k++) {
-        Four origin = *(const Four *)(a + 4 * k);
-        Four to_b = *(const Four *)(b + 4 * k) - origin, to_c = *(const Four *)(c + 4 * k) - origin;
-        across[k] = to_b * b_across - to_c * c_across;
-        down[k] = to_c * c_down - to_b * b_down;
-    }
-    Picture picture = {0, 0, 0};
     if (r->texture_place)
-        picture = picture_for(&r->texture, (int)(a[11] + 0.5f), texture_pixels(&r->texture, a, b, c, area));
-    for (; rows.row < rows.end; next_row(&rows)) {
-        int from, to;
-        samples_of_row(&rows, (int)r->width, &from, &to);
-        if (from >= to)
-            continue;
-        Four value[3];
-        for (int k = first; k <= last; k++)
-            value[k] = *(const Four *)(a + 4 * k) + across[k] * (from - x[0]) + down[k] * (rows.row - y[0]);
-        int64_t at = rows.row * r->width + from;
-        if (r->texture_place)
-            fill_textured(r, &picture, at, to - from, value, across);
-        else
-            fill(r, at, to - from, value[1], across[1]);
-    }
-}
-
-/* Draw into the samples. */
-EXPORT HOT void draw(const Raster *r)
-{
-    place_corners(r);
-    for (int64_t i = 0; i < r->width * r->height; i++)
-        r->nearness[i] = 0.0f;
-    for (int64_t f = 0; f < r->face_count; f++) {
-        const float *a = r->corners + CORNER * r->faces[3 * f], *b = r->corners + CORNER * r->faces[3 * f + 1];
-        const float *c = r->corners + CORNER * r->faces[3 * f + 2];
-        float x[3] = {a[0], b[0], c[0]}, y[3] = {a[1], b[1], c[1]}, area = twice_area(x, y);
-        int hidden = a[7] == 0.0f || b[7] == 0.0f || c[7] == 0.0f;
-        /* what is counter-clockwise seen from the camera has a negative area where rows run downward */
-        if (hidden || area == 0.0f || (r->closed && area > 0.0f))
-            continue;
-        if (area > 0.0f)
-            draw_triangle(r, a, b, c);
-        else
-            draw_triangle(r, a, c, b);
-    }
-}
-
-/* The mean of each pixel's samples: radiance times coverage, and coverage, (height, width, 4) in pixels. */
-EXPORT HOT void resolve(const Raster *r, float *drawn)
-{
-    int64_t s = r->samples, columns = r->width / s;
-    float share = 1.0f / (float)(s * s);
-    for (int64_t row = 0; row < r->height / s; row++)
-        for (int64_t column = 0; column < columns; column++) {
-            Four sum = {0.0f, 0.0f, 0.0f, 0.0f};
-            for (int64_t i = 0; i < s; i++)
-                for (int64_t j = 0; j < s; j++) {
-                    int64_t at = (row * s + i) * r->width + column * s + j;
-                    if (r->nearness[at] > 0.0f)
-                        sum += ((const Four *)r->radiance)[at];
-                }
-            ((Four *)drawn)[row * columns + column] = sum * share;
+        for (int64_t i = 0; i < r->vertex_count; i++) {
+            Corner *corner = r->corners + i;
+            corner->u = r->texture_place[3 * i] * corner->nearness;
+            corner->v = r->texture_place[3 * i + 1] * corner->nearness;
         }
+}
+
+/* Values over the depth at a triangle's first sample, and their change to the next column and row. */
+typedef struct {
+    Four first, across, down;
+} Gradient;
+
+/* From the values at the corners; the first sample is the box's. */
+INLINE Gradient gradient_of(const Triangle *t, float sample_over_area, Four a, Four b, Four c)
+{
+    Four to_b = (b - a) * sample_over_area, to_c = (c - a) * sample_over_area;
+    Four across = to_b * (float)(t->y[2] - t->y[0]) - to_c * (float)(t->y[1] - t->y[0]);
+    Four down = to_c * (float)(t->x[1] - t->x[0]) - to_b * (float)(t->x[2] - t->x[0]);
+    float right = (float)(SNAP * t->left - t->x[0]) / SNAP, below = (float)(SNAP * t->top - t->y[0]) / SNAP;
+    return (Gradient){a + across * right + down * below, across, down};
+}
+
+INLINE Four value_at(const Gradient *g, int right, int below)
+{
+    return g->first + g->across * (float)right + g->down * (float)below;
+}
+
+/* Of eight samples side by side, in the first row. */
+INLINE void values_from(const Gradient *g, int right, Eight value[4])
+{
+    for (int c = 0; c < 4; c++)
+        value[c] = g->first[c] + g->across[c] * __builtin_convertvector(right + COLUMN, Eight);
+}
+
+/* Draw eight samples of a row, of which those of the first row are given. */
+INLINE void put_below(const Samples *s, int64_t at, EightBits outside, const Eight first[4], const Four *down, int below)
+{
+    Eight value[4];
+    for (int c = 0; c < 4; c++)
+        value[c] = first[c] + (*down)[c] * (float)below;
+    put(s, at, outside, value);
+}
+
+/* A triangle inside the picture of which eight samples side by side hold each row. */
+INLINE void draw_small(const Samples *s, const Triangle *t, const Gradient *g)
+{
+    Edges edges = edges_of(t);
+    Eight first[4];
+    values_from(g, 0, first);
+    int64_t at = t->top * s->width + t->left;
+    for (int below = 0; below < t->bottom - t->top; below++, at += s->width) {
+        put_below(s, at, edges.outside[0] | edges.outside[1] | edges.outside[2], first, &g->down, below);
+        for (int i = 0; i < 3; i++)
+            edges.outside[i] += edges.down[i];
+    }
+}
+
+/* Any triangle. */
+INLINE void draw_rows(const Samples *s, const Triangle *t, const Gradient *g)
+{
+    int from, to;
+    Eight first[4];
+    for (Rows rows = rows_of(t, (int)s->height); rows.row < rows.end; next_row(&rows)) {
+        samples_of_row(&rows, (int)s->width, &from, &to);
+        for (int column = from; column < to; column += SIDE_BY_SIDE) {
+            values_from(g, column - t->left, first);
+            /* the sign of what is left of the row */
+            EightBits outside = to - column - 1 - COLUMN;
+            put_below(s, rows.row * s->width + column, outside, first, &g->down, rows.row - t->top);
+        }
+    }
+}
+
+/* The picture to look up: how many pixels of the finest texture lie in a sample is told by the corners' u and v. */
+INLINE Picture picture_of(const Raster *r, const int32_t face[3], float sample_over_area)
+{
+    const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
+    float u = a->u / a->nearness, v = a->v / a->nearness;
+    float area = (b->u / b->nearness - u) * (c->v / c->nearness - v) - (c->u / c->nearness - u) * (b->v / b->nearness - v);
+    float pixels = fabsf(area * sample_over_area * SNAP) * (float)(r->texture.width * r->texture.height);
+    return picture_for(&r->texture, (int)(r->texture_place[3 * face[0] + 2] + 0.5f), pixels);
+}
+
+/* Any triangle, with a texture on the body under its gloss. */
+INLINE void draw_textured(const Raster *r, const Triangle *t, const int32_t face[3], float over_area, const Gradient *g)
+{
+    const Samples *s = &r->samples;
+    Four place[3], gloss[3];
+    for (int i = 0; i < 3; i++) {
+        const Corner *corner = r->corners + face[i];
+        place[i] = (Four){corner->u, corner->v, 0.0f, 0.0f};
+        gloss[i] = *(const Four *)(r->mirrored + 4 * face[i]) * corner->nearness;
+    }
+    Gradient places = gradient_of(t, over_area, place[0], place[1], place[2]);
+    Gradient glosses = gradient_of(t, over_area, gloss[0], gloss[1], gloss[2]);
+    Picture picture = picture_of(r, face, over_area);
+    int from, to;
+    for (Rows rows = rows_of(t, (int)s->height); rows.row < rows.end; next_row(&rows)) {
+        samples_of_row(&rows, (int)s->width, &from, &to);
+        for (int column = from; column < to; column++) {
+            int64_t at = rows.row * s->width + column;
+            int right = column - t->left, below = rows.row - t->top;
+            Four body = value_at(g, right, below);
+            if (!(body[3] > s->nearness[at]))
+                continue;
+            Four uv = value_at(&places, right, below), mirrored = value_at(&glosses, right, below);
+            float depth = 1.0f / body[3], colour[3];
+            look_up(&r->texture, &picture, uv[0] * depth, uv[1] * depth, colour);
+            s->nearness[at] = body[3];
+            for (int c = 0; c < 3; c++)
+                s->radiance[c * s->plane + at] = (body[c] * colour[c] + mirrored[c]) * depth;
+        }
+    }
+}
+
+/* A face whose corners are all in front of the camera. */
+INLINE void draw_face(const Raster *r, const int32_t given[3])
+{
+    int32_t face[3] = {given[0], given[1], given[2]};
+    Triangle t;
+    for (int i = 0; i < 3; i++)
+        t.x[i] = (int32_t)r->corners[face[i]].x, t.y[i] = (int32_t)r->corners[face[i]].y;
+    int64_t area = twice_area(&t);
+    /* what is counter-clockwise seen from the camera has a negative area where rows run downward */
+    if (area == 0 || (r->closed && area > 0))
+        return;
+    if (area < 0) {
+        area = -area;
+        int32_t x = t.x[1], y = t.y[1];
+        face[1] = given[2], t.x[1] = t.x[2], t.y[1] = t.y[2];
+        face[2] = given[1], t.x[2] = x, t.y[2] = y;
+    }
+    find_box(&t);
+    const Samples *s = &r->samples;
+    int inside = (t.left >= 0) & (t.top >= 0) & (t.right <= s->width) & (t.bottom <= s->height);
+    if (t.left >= t.right || t.top >= t.bottom || t.right <= 0 || t.bottom <= 0 || t.left >= s->width || t.top >= s->height)
+        return;
+    Four corner[3];
+    for (int i = 0; i < 3; i++)
+        corner[i] = *(const Four *)r->corners[face[i]].radiance;
+    float over_area = (float)SNAP / (float)area;
+    Gradient g = gradient_of(&t, over_area, corner[0], corner[1], corner[2]);
+    if (r->texture_place)
+        draw_textured(r, &t, face, over_area, &g);
+    else if (inside && is_small(&t))
+        draw_small(s, &t, &g);
+    else
+        draw_rows(s, &t, &g);
+}
+
+/* The picture (height / side, width / side, 4): radiance times coverage, and coverage. */
+EXPORT HOT void draw(const Raster *r, float *drawn)
+{
+    const Samples *s = &r->samples;
+    place_corners(r);
+    memset(s->nearness, 0, (size_t)(s->width * s->height) * sizeof *s->nearness);
+    for (const int32_t *face = r->faces; face < r->faces + 3 * r->face_count; face += 3) {
+        const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
+        if ((a->nearness > 0.0f) & (b->nearness > 0.0f) & (c->nearness > 0.0f))
+            draw_face(r, face);
+    }
+    if (r->side == 2)
+        mean_of_samples(s, 2, drawn);
+    else
+        mean_of_samples(s, r->side, drawn);
 }

@@ -17,21 +17,23 @@ from arlight.rendering.transfer import Transfer
 
 Image = NDArray[np.float32]
 
-_CORNER = 12
-"""Columns of a corner, as in raster.c."""
+_CORNER = 8
+"""Numbers of a corner, as in raster.c."""
+_SIDE_BY_SIDE = 8
+"""Samples that are drawn at once, as in samples.h."""
 _MOST_SAMPLES = 1 << 21
 """A picture of more samples is drawn in bands, so that memory stays bounded."""
-_shade = library(__file__, "shading").shade
-_raster = library(__file__, "raster")
-for _function, _types in ((_shade, 1), (_raster.draw, 1), (_raster.resolve, 2)):
-    _function.restype, _function.argtypes = None, [ctypes.c_void_p] * _types
+_shade = library(__file__, "shading", keeps_lock=True).shade
+_draw = library(__file__, "raster").draw
+_shade.restype = _draw.restype = None
+_shade.argtypes, _draw.argtypes = [ctypes.c_void_p], [ctypes.c_void_p] * 2
 
 
 class _Shading(Workspace):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("position_mm", "normal", "base_colour", "openness", "lit", "gloss")),
-        *((name, ctypes.c_void_p) for name in ("ends", "matte", "body", "mirrored", "scratch")),
-        *((name, ctypes.c_int64) for name in ("count", "lit_count", "stride", "side")),
+        *((name, ctypes.c_void_p) for name in ("ends", "body", "mirrored", "scratch")),
+        *((name, ctypes.c_int64) for name in ("count", "lit_count", "side")),
         ("eye_mm", ctypes.c_double * 3),
         *((name, ctypes.c_double) for name in ("roughness", "normal_reflectance")),
     )
@@ -41,7 +43,8 @@ class _Raster(Workspace):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("pixels", "depth_mm", "body", "mirrored", "faces", "texture_place")),
         *((name, ctypes.c_void_p) for name in ("corners", "nearness", "radiance")),
-        *((name, ctypes.c_int64) for name in ("vertex_count", "face_count", "closed", "width", "height", "samples")),
+        *((name, ctypes.c_int64) for name in ("plane", "width", "height")),
+        *((name, ctypes.c_int64) for name in ("vertex_count", "face_count", "closed", "samples")),
         *((name, ctypes.c_void_p) for name in ("levels", "linear")),
         *((name, ctypes.c_int64) for name in ("layers", "texture_width", "texture_height", "level_count")),
         *((name, ctypes.c_double) for name in ("left_px", "top_px", "near_mm")),
@@ -80,18 +83,18 @@ class RasterRenderer:
         if refinement is not None:
             mesh, ends, openness = refinement.mesh, refinement.ends, refinement.carried(openness)
         n = len(mesh.vertices_mm)
-        planes = {"position_mm": mesh.vertices_mm, "normal": mesh.normals}
+        planes: dict[str, NDArray[np.floating]] = {"position_mm": mesh.vertices_mm, "normal": mesh.normals}
+        planes["openness"] = openness
         self._shading = _Shading(
             count=n, lit_count=lit_count, side=GLOSS_SIDE, roughness=roughness, normal_reflectance=normal_reflectance
         )
         self._shading.hold(
             {name: np.ascontiguousarray(values.T, np.float32) for name, values in planes.items()}
-            | {"base_colour": np.ascontiguousarray(mesh.base_colour.T, np.float32)}
-            | {"openness": np.ascontiguousarray(openness.T, np.float32)}
+            | {"base_colour": np.column_stack([mesh.base_colour, np.zeros(n)]).astype(np.float32)}
+            | {"ends": np.ascontiguousarray(ends), "scratch": np.empty((4, n), np.float32)}
         )
-        lit = {"body": np.empty((3, n), np.float32), "mirrored": np.empty((3, n), np.float32)}
-        own = {"ends": np.ascontiguousarray(ends), "matte": np.empty((3, n), np.float32)}
-        self._shading.hold(lit | own | {"scratch": np.empty((4, n), np.float32)})
+        lit = {"body": np.empty((n, 4), np.float32), "mirrored": np.empty((n, 4), np.float32)}
+        self._shading.hold(lit)
         self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed)
         self.supersampling = supersampling
         """Samples along a pixel's side; may change from picture to picture."""
@@ -99,7 +102,6 @@ class RasterRenderer:
         self._raster.hold(lit | {"faces": np.ascontiguousarray(mesh.faces, np.int32), "corners": corners})
         if mesh.textures is not None and mesh.uv is not None and mesh.layer is not None:
             self._hold_textures(mesh.textures, np.column_stack([mesh.uv, mesh.layer]))
-        self._nearness = np.empty(0, np.float32)
         self._drawn = np.empty(0, np.float32)
 
     def draw(self, view: View, packed: NDArray[np.float32]) -> Image:
@@ -125,8 +127,7 @@ class RasterRenderer:
         picture = address(self._drawn, np.float32)
         for top in range(0, height, rows):
             raster.top_px, raster.height = region.y0 + top, min(rows, height - top) * samples
-            _raster.draw(ctypes.byref(raster))
-            _raster.resolve(ctypes.byref(raster), picture + 16 * width * top)
+            _draw(ctypes.byref(raster), picture + 16 * width * top)
         return self._drawn[: 4 * width * height].reshape(height, width, 4)
 
     def release(self) -> None:
@@ -135,8 +136,7 @@ class RasterRenderer:
     def _shade(self, view: View, packed: NDArray[np.float32]) -> None:
         shading = self._shading
         matte, gloss = self._rows.light(packed)
-        shading.lit, shading.gloss = matte.ctypes.data, gloss.ctypes.data
-        shading.stride = matte.strides[0] // matte.itemsize
+        shading.lit, shading.gloss = address(matte, np.float32), address(gloss, np.float32)
         shading.eye_mm[:] = view.camera_from_probe.camera_centre_mm.tolist()
         _shade(ctypes.byref(shading))
 
@@ -160,8 +160,8 @@ class RasterRenderer:
 
     def _reserve(self, samples: int, values: int) -> None:
         """Room for samples and picture; it only grows."""
-        if len(self._nearness) < samples:
-            self._nearness = np.empty(samples, np.float32)
-            self._raster.hold({"nearness": self._nearness, "radiance": np.empty((samples, 4), np.float32)})
+        if self._raster.plane < samples + _SIDE_BY_SIDE:
+            self._raster.plane = plane = samples + _SIDE_BY_SIDE
+            self._raster.hold({"nearness": np.empty(plane, np.float32), "radiance": np.empty((3, plane), np.float32)})
         if len(self._drawn) < values:
             self._drawn = np.empty(values, np.float32)

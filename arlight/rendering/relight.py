@@ -23,7 +23,7 @@ from arlight.rendering.raster import RasterRenderer
 from arlight.rendering.reconstruction import reconstruct
 from arlight.rendering.refinement import refined
 from arlight.rendering.settings import RelightSettings
-from arlight.rendering.shadow import dark_texels, drop_faint, irradiance_ratio
+from arlight.rendering.shadow import Darkening
 from arlight.rendering.transfer_cache import kept_transfer
 from arlight.rendering.visibility import Progress
 from arlight.video.dimming import node_box
@@ -109,6 +109,7 @@ class Relighter:
         )
         shadow = self.transfer.shadow
         self._plane_rows = LightRows([shadow.hidden_rows, shadow.open_row[None]], self._reconstruction.independent)
+        self._plane_darkening = Darkening(shadow.grid, _FAINT)
         self._plane_shader = PlaneShader(camera, shadow.grid)
         self._projector = Projector(camera)
         refines = s.renderer == "native" and len(self.mesh.faces) <= s.lit_faces
@@ -149,7 +150,7 @@ class Relighter:
     def _shade(self, frame: Frame, camera_from_probe: Pose, packed: NDArray[np.float32]) -> Shade | None:
         """The shadow on the plane."""
         ratio = self._darkening(packed)
-        region = self._shadow_region(camera_from_probe, ratio)
+        region = self._shadow_region(camera_from_probe)
         if region is None:
             return None
         region = Region(*node_box(region, frame.size))
@@ -158,9 +159,7 @@ class Relighter:
     def _darkening(self, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         """(side, side, 4) what the object leaves of the plane's light, faint shadow aside."""
         hidden, open_plane = self._plane_rows.light(packed)
-        ratio = irradiance_ratio(hidden, open_plane[:, 0], self.transfer.shadow.grid.side)
-        drop_faint(ratio, _FAINT)
-        return ratio
+        return self._plane_darkening.ratio(hidden, open_plane[0, :3])
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""
@@ -235,10 +234,7 @@ class Relighter:
             )
         return pack_real(lighting.coefficients).astype(np.float32)
 
-    def _shadow_region(self, camera_from_probe: Pose, ratio: NDArray[np.float32]) -> Region | None:
-        """Pixels that see the darkened part of the plane."""
-        box = dark_texels(ratio)
-        if box is None:
-            return None
-        outline = self.transfer.shadow.grid.outline_mm(*box)
-        return self._projector.project(camera_from_probe, outline).region(margin_px=1)
+    def _shadow_region(self, camera_from_probe: Pose) -> Region | None:
+        """Pixels that see the part of the plane that was darkened last."""
+        outline = self._plane_darkening.outline_mm()
+        return None if outline is None else self._projector.project(camera_from_probe, outline).region(margin_px=1)

@@ -2,26 +2,26 @@
    object.frag have it. */
 #include "native.h"
 #include "bounded.h"
+#include "eight.h"
 #include <string.h>
 
 typedef struct {
     const float *position_mm; /* (3, n) probe frame */
     const float *normal;      /* (3, n) */
-    const float *base_colour; /* (3, n) */
+    const float *base_colour; /* (n, 4) */
     const float *openness;    /* (9, n) visibility, real spherical harmonics of the second order */
-    const float *lit;         /* (3, stride) radiance of a white matte surface at the first `lit_count` vertices */
-    const float *gloss;       /* (3, stride) octahedral map (side, side) of lobe-averaged radiance */
+    const float *lit;         /* (lit_count, 4) radiance of a white matte surface at the first vertices */
+    const float *gloss;       /* (side * side, 4) octahedral map of lobe-averaged radiance */
     const int32_t *ends;      /* (count - lit_count, 2) the two among those that each further vertex lies between */
-    float *matte;             /* (3, n) of all of them */
-    float *body;              /* (3, n) radiance of the body before its texture */
-    float *mirrored;          /* (3, n) radiance of the gloss */
+    float *body;              /* (n, 4) radiance of the body before its texture */
+    float *mirrored;          /* (n, 4) radiance of the gloss */
     float *scratch;           /* (4, n) place on the map, visibility there, gloss albedo */
-    int64_t count, lit_count, stride, side;
+    int64_t count, lit_count, side;
     double eye_mm[3], roughness, normal_reflectance;
 } Shading;
 
 /* 2^x for x <= 0, to 2e-5: the fit below needs no more. */
-static inline float two_to(float x)
+INLINE float two_to(float x)
 {
     float whole = floorf(x), f = x - whole;
     float part = 1.0f + f * (0.6931472f + f * (0.2402265f + f * (0.0555041f + f * (0.0096181f + f * 0.0013333f))));
@@ -33,7 +33,7 @@ static inline float two_to(float x)
 
 /* Directional albedo of the gloss: the split-sum integral as B. Karis, "Physically Based Shading on Mobile" (2014),
    fits it. */
-static inline float gloss_albedo(float cosine, float roughness, float reflectance)
+INLINE float gloss_albedo(float cosine, float roughness, float reflectance)
 {
     float rx = 1.0f - roughness, ry = 0.0425f - 0.0275f * roughness;
     float rz = 1.04f - 0.572f * roughness, rw = -0.04f + 0.022f * roughness;
@@ -44,7 +44,7 @@ static inline float gloss_albedo(float cosine, float roughness, float reflectanc
 }
 
 /* Place of a direction on the octahedral map, in texels whose centres lie at integers, kept on the map. */
-static inline void octahedral_place(float x, float y, float z, float side, float *u, float *v)
+INLINE void octahedral_place(float x, float y, float z, float side, float *u, float *v)
 {
     float scale = 1.0f / (fabsf(x) + fabsf(y) + fabsf(z));
     x *= scale, y *= scale;
@@ -57,7 +57,7 @@ static inline void octahedral_place(float x, float y, float z, float side, float
 }
 
 /* Where on the map vertices find what they mirror, how freely they see there, and the share that is mirrored. */
-static inline void reflect(const Shading *s)
+INLINE void reflect(const Shading *s)
 {
     int64_t n = s->count;
     const float *p = s->position_mm, *v = s->normal, *o = s->openness;
@@ -81,20 +81,6 @@ static inline void reflect(const Shading *s)
     }
 }
 
-/* Light of one colour at the vertices that have none of their own. */
-static inline void carry(const Shading *s, int channel)
-{
-    const float *lit = s->lit + channel * s->stride;
-    const int32_t *ends = s->ends;
-    float *restrict matte = s->matte + channel * s->count;
-    memcpy(matte, lit, (size_t)s->lit_count * sizeof *matte);
-    matte += s->lit_count;
-    int64_t further = s->count - s->lit_count;
-#pragma GCC ivdep
-    for (int64_t i = 0; i < further; i++)
-        matte[i] = 0.5f * (lit[ends[2 * i]] + lit[ends[2 * i + 1]]);
-}
-
 /* The gloss's share (n,) of what is seen at cosines (n,) to the view. */
 EXPORT HOT void gloss_albedos(
     const float *cosine, int64_t count, double roughness, double normal_reflectance, float *albedo)
@@ -103,30 +89,34 @@ EXPORT HOT void gloss_albedos(
         albedo[i] = gloss_albedo(greater(cosine[i], 0.02f), (float)roughness, (float)normal_reflectance);
 }
 
-/* Mix one colour of the body's light with what the gloss mirrors, bilinear on its map. */
-static inline void mix(const Shading *s, int channel)
+/* Where on the map a vertex finds what it mirrors: bilinear. */
+INLINE Four mirrored_at(const Shading *s, float u, float v)
 {
-    int64_t n = s->count;
-    const float *u = s->scratch, *v = s->scratch + n, *open = s->scratch + 2 * n, *albedo = s->scratch + 3 * n;
-    const float *map = s->gloss + channel * s->stride, *matte = s->matte + channel * n;
-    const float *base = s->base_colour + channel * n;
-    float *restrict body = s->body + channel * n, *restrict mirrored = s->mirrored + channel * n;
-    int32_t side = (int32_t)s->side;
-#pragma GCC ivdep
-    for (int64_t i = 0; i < n; i++) {
-        int32_t column = (int32_t)u[i], row = (int32_t)v[i], at = row * side + column;
-        float fu = u[i] - (float)column, fv = v[i] - (float)row;
-        float upper = map[at] * (1.0f - fu) + map[at + 1] * fu;
-        float lower = map[at + side] * (1.0f - fu) + map[at + side + 1] * fu;
-        mirrored[i] = greater(upper * (1.0f - fv) + lower * fv, 0.0f) * open[i] * albedo[i];
-        body[i] = base[i] * greater(matte[i], 0.0f) * (1.0f - albedo[i]);
-    }
+    int32_t column = (int32_t)u, row = (int32_t)v;
+    const Four *upper = (const Four *)s->gloss + row * s->side + column, *lower = upper + s->side;
+    float right = u - (float)column;
+    Four above = upper[0] + right * (upper[1] - upper[0]), below = lower[0] + right * (lower[1] - lower[0]);
+    return above + (v - (float)row) * (below - above);
+}
+
+/* Mix the body's light with what the gloss mirrors. */
+INLINE void mix(const Shading *s, int64_t i, Four matte)
+{
+    const float *scratch = s->scratch + i;
+    float open = scratch[2 * s->count], albedo = scratch[3 * s->count];
+    Four mirrored = mirrored_at(s, scratch[0], scratch[s->count]);
+    ((Four *)s->mirrored)[i] = positive(mirrored) * (open * albedo);
+    ((Four *)s->body)[i] = ((const Four *)s->base_colour)[i] * positive(matte) * (1.0f - albedo);
 }
 
 /* Radiance of the body and of the gloss. */
 EXPORT HOT void shade(const Shading *s)
 {
+    const Four *lit = (const Four *)s->lit;
+    const int32_t *ends = s->ends;
     reflect(s);
-    for (int channel = 0; channel < 3; channel++)
-        carry(s, channel), mix(s, channel);
+    for (int64_t i = 0; i < s->lit_count; i++)
+        mix(s, i, lit[i]);
+    for (int64_t i = s->lit_count; i < s->count; i++, ends += 2)
+        mix(s, i, 0.5f * (lit[ends[0]] + lit[ends[1]]));
 }

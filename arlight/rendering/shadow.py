@@ -13,12 +13,9 @@ from arlight.rendering.reconstruction import Reconstruction
 Array = NDArray[np.float64]
 Rows = NDArray[np.float32]
 
-_native = library(__file__, "shadow")
-_native.irradiance_ratio.restype = _native.dark_box.restype = _native.drop_faint.restype = None
-_pointer, _integer = ctypes.c_void_p, ctypes.c_int64
-_native.irradiance_ratio.argtypes = [_pointer, _integer, _pointer, _integer, _pointer]
-_native.drop_faint.argtypes = [_pointer, _integer, ctypes.c_float]
-_native.dark_box.argtypes = [_pointer, _integer, ctypes.c_double, _pointer]
+_darken = library(__file__, "shadow", keeps_lock=True).darken
+_darken.restype = None
+_darken.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p]
 _REACH_HEIGHTS = 1.0
 """How far the map reaches beyond the object, in heights of the object: light above 45 degrees stays inside."""
 _FADE = 0.35
@@ -41,16 +38,6 @@ class PlaneGrid:
         steps = (np.arange(self.side) + 0.5) * self.texel_mm
         x, y = np.meshgrid(self.corner_mm[0] + steps, self.corner_mm[1] + steps)
         return np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-
-    def outline_mm(self, first_column: int, last_column: int, first_row: int, last_row: int) -> Rows:
-        """Outline (36, 3) of what a range of texels reaches in bilinear lookup; in steps, because a lens bends it."""
-        share = np.linspace(0.0, 1.0, 9)
-        x = self.corner_mm[0] + (first_column - 0.5 + share * (last_column - first_column + 2.0)) * self.texel_mm
-        y = self.corner_mm[1] + (first_row - 0.5 + share * (last_row - first_row + 2.0)) * self.texel_mm
-        outline = np.zeros((4, 9, 3), np.float32)
-        outline[:2, :, 0], outline[0, :, 1], outline[1, :, 1] = x, y[0], y[-1]
-        outline[2:, :, 1], outline[2, :, 0], outline[3, :, 0] = y, x[0], x[-1]
-        return outline.reshape(-1, 3)
 
     def texel_of(self, points_mm: ArrayLike) -> Array:
         """(..., 2) fractional (column, row) of points (..., >= 2) of the plane; texel centres lie at integers."""
@@ -89,8 +76,9 @@ class PlaneShadow:
             (side, side, 3) in [0, 1]; 1 where the open plane itself would be dark.
         """
         light = np.asarray(packed, np.float32)
-        hidden, open_plane = np.ascontiguousarray((self.hidden_rows @ light).T), self.open_row @ light
-        return irradiance_ratio(hidden, open_plane, self.grid.side)[..., :3]
+        hidden = np.zeros((len(self.hidden_rows), 4), np.float32)
+        hidden[:, :3] = self.hidden_rows @ light
+        return Darkening(self.grid).ratio(hidden, self.open_row @ light)[..., :3]
 
     def openness_along(self, points_mm: Array, direction: Array) -> Rows:
         """Openness (p,) of the ground where rays from points (p, 3) along a downward direction (3,) meet it."""
@@ -101,37 +89,56 @@ class PlaneShadow:
         return np.where(inside, self.openness[np.clip(row, 0, last), np.clip(column, 0, last)], np.float32(1.0))
 
 
-def irradiance_ratio(hidden: Rows, open_plane: Rows, side: int) -> Rows:
-    """The share of the open plane's irradiance (3,) that is left where (3, side * side) of it is hidden.
+class Darkening:
+    """What an object leaves of the plane's light, from one light to the next. Not for two threads at once."""
 
-    Returns:
-        (side, side, 4): three colours in [0, 1], and the least of them; 1 where the open plane itself is dark.
-    """
-    if hidden.shape != (3, side * side) or hidden.strides[1] != 4 or hidden.dtype != np.float32:
-        raise ValueError(f"hidden must be rows of float32, (3, {side * side}), found {hidden.dtype} {hidden.shape}")
-    open_three = np.ascontiguousarray(open_plane, np.float32)
-    ratio = np.empty((side, side, 4), np.float32)
-    _native.irradiance_ratio(
-        hidden.ctypes.data, hidden.strides[0] // 4, address(open_three, np.float32), side * side,
-        address(ratio, np.float32),
-    )  # fmt: skip
-    return ratio
+    def __init__(self, grid: PlaneGrid, faint: float = 0.0) -> None:
+        """Set out the texels.
 
+        Args:
+            grid: the texels.
+            faint: what is darkened by less than this share is left alone. From twice the share down to it darkening
+                fades to nothing, so that no contour shows where it ends.
+        """
+        self._grid, self._faint = grid, faint
+        self._ratio = np.ones((grid.side, grid.side, 4), np.float32)
+        self._ratio_address = address(self._ratio, np.float32)
+        self._box = (ctypes.c_int64 * 4)()
+        # the outline of a square of side 1, in steps, because a lens bends it
+        steps = np.linspace(0.0, 1.0, 9)
+        low, high = np.zeros(9), np.ones(9)
+        outline = [np.concatenate(parts) for parts in ((steps, steps, low, high), (low, high, steps, steps))]
+        self._square = np.stack([*outline, np.zeros(36)], axis=-1)
 
-def drop_faint(ratio: Rows, faint: float) -> None:
-    """Leave alone, in place, what is darkened (side, side, 4) by less than a share.
+    def ratio(self, hidden: Rows, open_plane: Rows) -> Rows:
+        """The share of the open plane's irradiance that is left.
 
-    From twice the share down to it darkening fades to nothing, so that no contour shows where it ends.
-    """
-    _native.drop_faint(address(ratio, np.float32), ratio.shape[0] * ratio.shape[1], faint)
+        Args:
+            hidden: (side * side, 4) irradiance that each texel loses, three colours and 0.
+            open_plane: (3,) irradiance of the open plane.
 
+        Returns:
+            (side, side, 4): three colours in [0, 1], and the least of them; 1 where the open plane itself is dark.
+            Overwritten by the next call.
+        """
+        if hidden.shape != (self._grid.side**2, 4):
+            raise ValueError(f"expected what {self._grid.side**2} texels lose in four numbers, found {hidden.shape}")
+        open_three = np.ascontiguousarray(open_plane, np.float32)
+        _darken(
+            address(hidden, np.float32), address(open_three, np.float32), self._grid.side, self._faint or 1e-30,
+            self._ratio_address, self._box,
+        )  # fmt: skip
+        return self._ratio
 
-def dark_texels(ratio: Rows) -> tuple[int, int, int, int] | None:
-    """First and last column, first and last row of the texels (side, side, 4) that are darkened at all."""
-    box = (ctypes.c_int64 * 4)()
-    _native.dark_box(address(ratio, np.float32), ratio.shape[0], 1.0, box)
-    first_column, last_column, first_row, last_row = box
-    return None if last_row < 0 else (first_column, last_column, first_row, last_row)
+    def outline_mm(self) -> Rows | None:
+        """Outline (36, 3) of what the texels that are darkened at all reach in bilinear lookup; None without any."""
+        first_column, last_column, first_row, last_row = self._box
+        if last_row < first_row:
+            return None
+        grid, step = self._grid, self._grid.texel_mm
+        corner = (grid.corner_mm[0] + (first_column - 0.5) * step, grid.corner_mm[1] + (first_row - 0.5) * step, 0.0)
+        size = ((last_column - first_column + 2.0) * step, (last_row - first_row + 2.0) * step, 0.0)
+        return np.asarray(self._square * size + corner, np.float32)
 
 
 def plane_shadow(

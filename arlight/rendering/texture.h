@@ -2,8 +2,7 @@
 #ifndef ARLIGHT_TEXTURE_H
 #define ARLIGHT_TEXTURE_H
 
-#include <math.h>
-#include <stdint.h>
+#include "native.h"
 
 typedef struct {
     const uint8_t *levels; /* each (layers, height >> level, width >> level, 3), at least 1 pixel; row 0 is v = 0 */
@@ -18,7 +17,7 @@ typedef struct {
 } Picture;
 
 /* The level whose pixels are about as large as a sample, of which `pixels` of the finest lie in one by area. */
-static inline Picture picture_for(const Texture *texture, int layer, float pixels)
+INLINE Picture picture_for(const Texture *texture, int layer, float pixels)
 {
     const uint8_t *start = texture->levels;
     int64_t width = texture->width, height = texture->height;
@@ -32,7 +31,7 @@ static inline Picture picture_for(const Texture *texture, int layer, float pixel
 }
 
 /* Pixel and share of the next one at a place along a side, the picture being repeated. */
-static inline void neighbours(float place, int size, int *first, int *second, float *share)
+INLINE void neighbours(float place, int size, int *first, int *second, float *share)
 {
     float at = (place - floorf(place)) * (float)size - 0.5f, before = floorf(at);
     int index = before >= 0.0f && before < (float)size ? (int)before : size - 1;
@@ -41,7 +40,7 @@ static inline void neighbours(float place, int size, int *first, int *second, fl
 }
 
 /* Linear colour at texture coordinates, bilinear. */
-static inline void look_up(const Texture *texture, const Picture *picture, float u, float v, float colour[3])
+INLINE void look_up(const Texture *texture, const Picture *picture, float u, float v, float colour[3])
 {
     int left, right, below, above;
     float across, up;

@@ -1,23 +1,33 @@
-/* The samples that a triangle covers, row by row: those whose centres lie inside, and where two triangles share an edge
-   every sample on it belongs to one of them alone. Corners lie on a grid of 1 / SNAP of a sample, and sample (column,
-   row) has its centre at just these integers.
+/* The samples that a triangle covers: those whose centres lie inside, and where two triangles share an edge every sample
+   on it belongs to one of them alone. Corners lie on a grid of 1 / SNAP of a sample, and sample (column, row) has its
+   centre at just these integers. Whichever way it is told, it is told exactly.
 
-   Where an edge crosses a row is a fraction whose denominator is the edge's height in grid steps: unless it is a whole
-   number it is farther than EDGE from one while the edge is less than 4096 samples high, and the rounding of as many
-   steps is no more than EDGE. So the decision is exact. */
+   A small triangle: by the sign of each edge, in whole numbers, for eight samples side by side.
+
+   Any other: row by row. Where an edge crosses a row is a fraction whose denominator is the edge's height in grid steps:
+   unless it is a whole number it is farther than EDGE from one while the edge is less than 4096 samples high, and the
+   rounding of as many steps is no more than EDGE. */
 #ifndef ARLIGHT_TRIANGLE_H
 #define ARLIGHT_TRIANGLE_H
 
-#include <math.h>
-#include <stdint.h>
+#include "samples.h"
 
-#include "bounded.h"
+enum { SNAP_BITS = 8, SNAP = 1 << SNAP_BITS, SMALL_HEIGHT = 64 };
 
-#define SNAP 256.0f
-#define MOST_SAMPLES 0x1p15f   /* corners farther than this from the first sample are not drawn */
+#define FARTHEST 0x1p23f       /* corners farther than this from the first sample, on the grid, are not drawn */
 #define ASIDE 0x1p17           /* farther aside than any row reaches */
 #define ONE ((int64_t)1 << 32) /* crossings are counted in this part of a sample */
 #define EDGE ((int64_t)1 << 11)
+
+typedef struct {
+    int32_t x[3], y[3];           /* corners on the grid, clockwise as seen with rows downward */
+    int left, right, top, bottom; /* samples of its box, from the first to before the last, inside the picture or not */
+} Triangle;
+
+typedef struct {
+    EightBits outside[3]; /* for each edge, of eight samples in a row: negative where they lie outside of it */
+    int32_t down[3];      /* its change to the next row */
+} Edges;
 
 typedef struct {
     int64_t left[2], right[2];           /* column where edges cross the row: inside is right of both, left of both */
@@ -25,81 +35,110 @@ typedef struct {
     int row, end;                        /* the row, and the one after the last */
 } Rows;
 
-/* Nearest place of the grid. */
-static inline float snapped(float samples)
+/* First sample that is not before a place of the grid. */
+INLINE int sample_from(int32_t place) { return (place + SNAP - 1) >> SNAP_BITS; }
+
+/* Twice the area, in steps of the grid; positive where the corners run clockwise as seen with rows downward. */
+INLINE int64_t twice_area(const Triangle *t)
 {
-    return rintf(samples * SNAP) * (1.0f / SNAP);
+    return (int64_t)(t->x[1] - t->x[0]) * (t->y[2] - t->y[0]) - (int64_t)(t->x[2] - t->x[0]) * (t->y[1] - t->y[0]);
 }
 
-/* Smallest integer that is not below a value, within [0, limit]. */
-static inline int first_from(float value, int limit)
+INLINE int32_t least(const int32_t v[3])
 {
-    float kept = greater(value, 0.0f);
-    return kept < (float)limit ? (int)ceilf(kept) : limit;
+    int32_t two = v[0] < v[1] ? v[0] : v[1];
+    return two < v[2] ? two : v[2];
 }
 
-static inline int64_t units(double samples)
+INLINE int32_t most(const int32_t v[3])
+{
+    int32_t two = v[0] > v[1] ? v[0] : v[1];
+    return two > v[2] ? two : v[2];
+}
+
+INLINE void find_box(Triangle *t)
+{
+    t->left = sample_from(least(t->x)), t->right = sample_from(most(t->x));
+    t->top = sample_from(least(t->y)), t->bottom = sample_from(most(t->y));
+}
+
+/* Whether eight samples side by side hold each of its rows. */
+INLINE int is_small(const Triangle *t)
+{
+    return (t->right - t->left <= SIDE_BY_SIDE) & (t->bottom - t->top <= SMALL_HEIGHT);
+}
+
+/* The edges of a small triangle at the first row of its box. */
+INLINE Edges edges_of(const Triangle *t)
+{
+    Edges edges;
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        int32_t across = t->x[j] - t->x[i], down = t->y[j] - t->y[i];
+        /* of what lies on an edge, left edges and upper ones own it */
+        int32_t other = down > 0 || (down == 0 && across < 0);
+        int32_t first = across * (SNAP * t->top - t->y[i]) - down * (SNAP * t->left - t->x[i]) - other;
+        edges.outside[i] = first - SNAP * down * COLUMN;
+        edges.down[i] = SNAP * across;
+    }
+    return edges;
+}
+
+INLINE int within(int value, int limit) { return value < 0 ? 0 : value > limit ? limit : value; }
+
+INLINE int64_t units(double samples)
 {
     double near = samples < ASIDE ? samples : ASIDE;
     return (int64_t)((near > -ASIDE ? near : -ASIDE) * ONE);
 }
 
-/* Start at the first row; the corners must run so that `twice_area` is positive. False where no row is met. */
-static inline int begin_rows(Rows *rows, const float x[3], const float y[3], int height)
+/* Start at the first of its rows within the height. */
+INLINE Rows rows_of(const Triangle *t, int height)
 {
-    float top = lesser(y[0], lesser(y[1], y[2])), bottom = greater(y[0], greater(y[1], y[2]));
-    rows->row = first_from(top, height);
-    rows->end = first_from(bottom, height);
-    if (rows->row >= rows->end)
-        return 0;
+    const double sample = 1.0 / SNAP;
+    Rows rows = {.left[1] = INT64_MIN / 2, .right[1] = INT64_MAX / 2};
+    rows.row = within(t->top, height), rows.end = within(t->bottom, height);
     int lefts = 0, rights = 0;
-    rows->left[1] = INT64_MIN / 2, rows->right[1] = INT64_MAX / 2;
-    rows->left_step[1] = rows->right_step[1] = 0;
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
-        double rise = (double)y[j] - y[i];
-        if (rise == 0.0)
+        int32_t rise = t->y[j] - t->y[i];
+        if (rise == 0)
             continue;
         /* told for the edge's own first row: what is so flat that it is cut short at ASIDE meets no other one */
-        int own = first_from(lesser(y[i], y[j]), height);
-        double slope = ((double)x[j] - x[i]) / rise;
+        int own = within(sample_from(rise > 0 ? t->y[i] : t->y[j]), height);
+        double slope = (double)(t->x[j] - t->x[i]) / rise;
         int64_t step = units(slope);
-        int64_t crossing = units(x[i] + (own - (double)y[i]) * slope) + (rows->row - own) * step - EDGE;
-        if (rise < 0.0)
-            rows->left[lefts] = crossing, rows->left_step[lefts++] = step;
+        double from = sample * t->x[i] + (own - sample * t->y[i]) * slope;
+        int64_t crossing = units(from) + (rows.row - own) * step - EDGE;
+        if (rise < 0)
+            rows.left[lefts] = crossing, rows.left_step[lefts++] = step;
         else
-            rows->right[rights] = crossing, rows->right_step[rights++] = step;
+            rows.right[rights] = crossing, rows.right_step[rights++] = step;
     }
-    return 1;
+    return rows;
 }
 
 /* First sample that is not left of a crossing, within [0, width]. */
-static inline int sample_from(int64_t crossing, int width)
+INLINE int sample_right_of(int64_t crossing, int width)
 {
     int64_t sample = (crossing + (ONE - 1)) >> 32;
     return (int)(sample < 0 ? 0 : sample > width ? width : sample);
 }
 
 /* The row's samples: from `*first` to before `*last`. */
-static inline void samples_of_row(const Rows *rows, int width, int *first, int *last)
+INLINE void samples_of_row(const Rows *rows, int width, int *first, int *last)
 {
-    *first = sample_from(rows->left[0] > rows->left[1] ? rows->left[0] : rows->left[1], width);
-    *last = sample_from(rows->right[0] < rows->right[1] ? rows->right[0] : rows->right[1], width);
+    *first = sample_right_of(rows->left[0] > rows->left[1] ? rows->left[0] : rows->left[1], width);
+    *last = sample_right_of(rows->right[0] < rows->right[1] ? rows->right[0] : rows->right[1], width);
 }
 
-static inline void next_row(Rows *rows)
+INLINE void next_row(Rows *rows)
 {
     rows->row++;
     for (int i = 0; i < 2; i++) {
         rows->left[i] += rows->left_step[i];
         rows->right[i] += rows->right_step[i];
     }
-}
-
-/* Twice the area; positive where the corners run clockwise as seen with rows downward. */
-static inline float twice_area(const float x[3], const float y[3])
-{
-    return (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
 }
 
 #endif

@@ -5,7 +5,7 @@ import trimesh
 from arlight.estimation.radiance_prior import hemisphere_points
 from arlight.fourier import pack_real
 from arlight.rendering.mesh_file import from_trimesh
-from arlight.rendering.shadow import PlaneGrid, PlaneShadow, drop_faint
+from arlight.rendering.shadow import Darkening, PlaneGrid, PlaneShadow
 from arlight.rendering.transfer import precompute_transfer
 from arlight.synthetic.captured import load_environment
 
@@ -109,16 +109,41 @@ def test_openness_is_looked_up_where_a_falling_ray_lands():
 
 
 def test_faint_darkening_fades_to_nothing_without_a_step():
-    darkening = np.linspace(0.0, 0.1, 2001).astype(np.float32)
-    ratio = np.ones((2001, 1, 4), np.float32)
-    ratio[:, 0, 3] = ratio[:, 0, 0] = 1.0 - darkening
-    ratio[:, 0, 1] = 1.0 - 0.5 * darkening
-    drop_faint(ratio, 0.01)
-    left = 1.0 - ratio[:, 0]
-    assert np.all(left[darkening < 0.01] == 0.0)
-    strong = darkening > 0.02
+    darkening = np.linspace(0.0, 0.1, 45 * 45).astype(np.float32)
+    hidden = darkening[:, None] * np.array([2.0, 0.5, 0.0, 0.0], np.float32)
+    ratio = Darkening(PlaneGrid((0.0, 0.0), 1.0, 45), 0.01).ratio(hidden, np.array([2.0, 1.0, 1.0]))
+    left = 1.0 - ratio.reshape(-1, 4)
+    assert np.all(left[darkening < 0.0099] == 0.0)
+    strong = darkening > 0.0201
     np.testing.assert_allclose(left[strong, 0], darkening[strong], atol=1e-6)
     np.testing.assert_allclose(left[strong, 1], 0.5 * darkening[strong], atol=1e-6)
+    assert np.all(left[:, 2] == 0.0)
+    assert np.array_equal(left[:, 3], left[:, :3].max(axis=1))
     assert np.all(np.diff(left[:, 0]) >= -1e-6)
     assert np.max(np.diff(left[:, 0])) < 4.0 * np.diff(darkening).max()
     assert np.all(np.abs(left[:, 0] - darkening) <= 0.01 + 1e-6)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [((2, 5), (1, 1)), ((0, 0), (0, 7)), ((0, 7), (3, 7))])
+def test_the_outline_is_that_of_what_darkened_texels_reach(columns, rows):
+    grid = PlaneGrid((-3.0, 5.0), 0.5, 8)
+    hidden = np.zeros((8, 8, 4), np.float32)
+    hidden[rows[0], columns[0], 1] = hidden[rows[1], columns[1], 2] = 0.5
+    darkening = Darkening(grid, 0.01)
+    darkening.ratio(hidden.reshape(64, 4), np.ones(3))
+    corners = grid.texel_of(darkening.outline_mm())
+    assert np.allclose(corners.min(axis=0), [columns[0] - 1.0, rows[0] - 1.0])
+    assert np.allclose(corners.max(axis=0), [columns[1] + 1.0, rows[1] + 1.0])
+    assert len(np.unique(corners.round(6), axis=0)) == 32
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.009, -1.0, np.nan])
+def test_what_is_hardly_darkened_has_no_outline(lost):
+    darkening = Darkening(PlaneGrid((0.0, 0.0), 1.0, 4), 0.01)
+    assert np.all(darkening.ratio(np.full((16, 4), lost, np.float32), np.ones(3)) == 1.0)
+    assert darkening.outline_mm() is None
+
+
+def test_what_is_hidden_of_other_texels_is_refused():
+    with pytest.raises(ValueError, match="16"):
+        Darkening(PlaneGrid((0.0, 0.0), 1.0, 4)).ratio(np.zeros((9, 4), np.float32), np.ones(3))
