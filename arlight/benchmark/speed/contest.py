@@ -1,6 +1,6 @@
-"""Several settings on the same frames, taking turns frame by frame, so that all of them see the same machine."""
+"""Several settings on the same frames, in turns of several, so that all of them see the same machine."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from time import process_time
 
@@ -26,6 +26,19 @@ class Contender:
     estimates: list[FrameEstimate] = field(default_factory=list)
     """What each frame told."""
 
+    def do(self, frame: Frame, measured: bool, clock: Clock) -> Frame:
+        """Make the composite of the next frame; take down what it cost and told if it is measured."""
+        begun = clock()
+        estimate = self.pipeline.estimate(frame)
+        estimated = clock()
+        composite = self.pipeline.relight(frame, estimate).composite
+        relit = clock()
+        if measured:
+            self.estimate_s.append(estimated - begun)
+            self.relight_s.append(relit - estimated)
+            self.estimates.append(estimate)
+        return composite
+
     @property
     def frame_s(self) -> list[float]:
         """CPU time of every frame [s]."""
@@ -42,8 +55,8 @@ class Contest:
     """CPU time of the yardstick on every frame [s]."""
 
 
-Judge = Callable[[int, Contender, Frame, Frame, FrameTruth], None]
-"""Looks at a frame that was made: number of the contender, contender, frame, composite, truth."""
+Judge = Callable[[int, FrameEstimate, Frame, Frame, FrameTruth], None]
+"""Looks at a frame that was made: number of the contender, its estimate, frame, composite, truth."""
 
 
 def contend(
@@ -59,34 +72,32 @@ def contend(
     Args:
         clip: the frames.
         frames: how many are measured.
-        contenders: take turns with every frame.
+        contenders: take turns.
         judge: sees every frame that is measured.
-        yardstick: takes its turn with every frame too.
+        yardstick: takes its turn too.
         clock: CPU time of the process [s].
     """
     contest = Contest()
     with single_threaded():
-        for frame, truth in clip.played(WARM_UP + frames):
-            begun = clock()
+        for turn in clip.turns(WARM_UP + frames):
+            contest.truth.extend(truth for frame, truth in turn if frame.index >= WARM_UP)
             if yardstick is not None:
-                yardstick(frame)
-            if frame.index >= WARM_UP:
-                contest.yardstick_s.append(clock() - begun)
-                contest.truth.append(truth)
+                contest.yardstick_s.extend(_timed(yardstick, turn, clock))
             for number, contender in enumerate(contenders):
-                begun = clock()
-                estimate = contender.pipeline.estimate(frame)
-                estimated = clock()
-                composite = contender.pipeline.relight(frame, estimate).composite
-                relit = clock()
-                if frame.index < WARM_UP:
-                    continue
-                contender.estimate_s.append(estimated - begun)
-                contender.relight_s.append(relit - estimated)
-                contender.estimates.append(estimate)
-                if judge is not None:
-                    judge(number, contender, frame, composite, truth)
+                composites = [contender.do(frame, frame.index >= WARM_UP, clock) for frame, _ in turn]
+                for (frame, truth), composite in zip(turn, composites, strict=True):
+                    if judge is not None and frame.index >= WARM_UP:
+                        judge(number, contender.estimates[frame.index - WARM_UP], frame, composite, truth)
     return contest
+
+
+def _timed(work: Callable[[Frame], object], turn: Sequence[tuple[Frame, FrameTruth]], clock: Clock) -> Iterator[float]:
+    """CPU time of the frames that are measured [s]."""
+    for frame, _ in turn:
+        begun = clock()
+        work(frame)
+        if frame.index >= WARM_UP:
+            yield clock() - begun
 
 
 def contender(clip: FilmedClip, settings: TrackerSettings, relighter: Relighter) -> Contender:

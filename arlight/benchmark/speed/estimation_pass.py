@@ -36,13 +36,22 @@ class EstimationPass:
     wall_s: list[float] = field(default_factory=list)
     """Wall time of them all [s]."""
     yardstick_s: list[float] = field(default_factory=list)
-    """CPU time of the yardstick [s]."""
+    """CPU time of the yardstick on the same frames; empty without one [s]."""
     estimates: list[FrameEstimate] = field(default_factory=list)
     """What each frame told."""
     yardstick_poses: list[Pose | None] = field(default_factory=list)
-    """What the yardstick told."""
+    """What the yardstick told; empty without one."""
     truth: list[FrameTruth] = field(default_factory=list)
     """What is true."""
+
+    def add(self, estimate: FrameEstimate, truth: FrameTruth, cpu_s: float, wall_s: float) -> None:
+        """Take down a frame."""
+        for stage, seconds in estimate.timings_s.items():
+            self.stages_s.setdefault(stage, []).append(seconds)
+        self.cpu_s.append(cpu_s)
+        self.wall_s.append(wall_s)
+        self.estimates.append(estimate)
+        self.truth.append(truth)
 
     @property
     def poses(self) -> list[Pose | None]:
@@ -73,29 +82,27 @@ def run_estimation(
         clip: the frames.
         frames: how many are measured, after the warm-up.
         make_tracker: the tracker of a sheet and camera, timing its stages by the clock it is given.
-        yardstick: measured in turns on the same frames.
+        yardstick: measured on the same frames, in turns of several.
         clock: CPU time of the process [s].
     """
     tracker = make_tracker(clip.probe, clip.camera, clock)
     done = EstimationPass()
     with single_threaded():
-        for frame, truth in clip.played(WARM_UP + frames):
-            wall, begun = perf_counter(), clock()
-            estimate = tracker.update(frame)
-            cpu, wall = clock() - begun, perf_counter() - wall
-            begun = clock()
-            pose = yardstick.pose(frame.luma()) if yardstick is not None else None
-            yardstick_s = clock() - begun
-            if frame.index < WARM_UP:
+        for turn in clip.turns(WARM_UP + frames):
+            for frame, truth in turn:
+                wall, begun = perf_counter(), clock()
+                estimate = tracker.update(frame)
+                cpu, wall = clock() - begun, perf_counter() - wall
+                if frame.index >= WARM_UP:
+                    done.add(estimate, truth, cpu, wall)
+            if yardstick is None:
                 continue
-            for stage, seconds in estimate.timings_s.items():
-                done.stages_s.setdefault(stage, []).append(seconds)
-            done.cpu_s.append(cpu)
-            done.wall_s.append(wall)
-            done.yardstick_s.append(yardstick_s)
-            done.estimates.append(estimate)
-            done.yardstick_poses.append(pose)
-            done.truth.append(truth)
+            for frame, _ in turn:
+                begun = clock()
+                pose = yardstick.pose(frame.luma())
+                if frame.index >= WARM_UP:
+                    done.yardstick_s.append(clock() - begun)
+                    done.yardstick_poses.append(pose)
     return done
 
 

@@ -10,10 +10,12 @@ from arlight.benchmark.speed.clip_errors import coefficient_errors, relative_rms
 from arlight.benchmark.speed.contest import Contender, contend, contender
 from arlight.benchmark.speed.findings import Findings, Ratio
 from arlight.benchmark.speed.front_settings import FrontSetting
-from arlight.benchmark.speed.playback import FilmedClip
+from arlight.benchmark.speed.playback import TURN, FilmedClip
 from arlight.benchmark.speed.relighters import FINEST, Relighters
 from arlight.benchmark.speed.spread import Spread, block_means, paired_ratio, spread
 from arlight.benchmark.speed.yardsticks import ArucoPose
+from arlight.estimation.lighting import Lighting
+from arlight.lighting_tracker import FrameEstimate
 from arlight.synthetic.truth import FrameTruth
 from arlight.video.frame import Frame, Region
 
@@ -149,21 +151,27 @@ class _PictureJudge:
 
     def __init__(self, clip: FilmedClip, relighters: Relighters, contenders: int) -> None:
         self._clip, self._finest = clip, relighters.of(clip.probe, clip.camera, FINEST)
-        self._reference: tuple[int, Frame] | None = None
+        self._references: dict[int, Frame] = {}
         self.errors: list[list[float]] = [[] for _ in range(contenders)]
         """Of each contender's frames."""
 
-    def __call__(self, number: int, each: Contender, frame: Frame, composite: Frame, truth: FrameTruth) -> None:
+    def __call__(self, number: int, estimate: FrameEstimate, frame: Frame, composite: Frame, truth: FrameTruth) -> None:
         if frame.index % _JUDGED_EVERY:
             return
-        lighting = each.estimates[-1].lighting
-        if lighting is None:
+        if estimate.lighting is None:
             self.errors[number].append(float("inf"))
             return
-        if self._reference is None or self._reference[0] != frame.index:
+        reference = self._reference(estimate.lighting, frame, truth)
+        self.errors[number].append(picture_error(frame, composite, reference))
+
+    def _reference(self, lighting: Lighting, frame: Frame, truth: FrameTruth) -> Frame:
+        """The frame as it should be, made once for all contenders; some lighting is needed for the light's units."""
+        if frame.index not in self._references:
+            # those of the turn before are not asked for again
+            self._references = {i: of for i, of in self._references.items() if abs(i - frame.index) < TURN}
             true = true_lighting(lighting, truth, self._clip.probe)
-            self._reference = frame.index, self._finest.render(frame, truth.pose, true)
-        self.errors[number].append(picture_error(frame, composite, self._reference[1]))
+            self._references[frame.index] = self._finest.render(frame, truth.pose, true)
+        return self._references[frame.index]
 
 
 def picture_error(frame: Frame, composite: Frame, reference: Frame) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from arlight.benchmark.speed.filming import CLIP_NAME, TRUTH_NAME, clip_folder
@@ -12,6 +13,10 @@ from arlight.probe.storage import load_probe
 from arlight.synthetic.truth import FrameTruth, load_truth
 from arlight.video.frame import Frame
 from arlight.video.reader import VideoReader
+
+TURN = 8
+"""Frames that each of those compared has in a row. Short, so that all see the same machine; frame by frame they would
+throw each other's code and memory out of the processor's caches, which neither does to itself when it runs alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +42,12 @@ class FilmedClip:
             place = index % len(self.frames)
             time_s = float(index / FRAME_RATE)
             yield replace(self.frames[place], index=index, time_s=time_s), self.truth[place]
+
+    def turns(self, count: int) -> Iterator[list[tuple[Frame, FrameTruth]]]:
+        """The same, `TURN` frames at a time."""
+        frames = self.played(count)
+        while turn := list(islice(frames, TURN)):
+            yield turn
 
 
 def load_clip(folder: Path, workload: Workload) -> FilmedClip:
