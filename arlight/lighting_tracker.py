@@ -1,6 +1,7 @@
 """Frames in, pose and lighting out: the estimation half of the frame loop, without rendering."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
@@ -33,6 +34,8 @@ from arlight.video.frame import Frame
 _DEFAULT_BLUR_PX = 0.6
 _LEVEL_DEVIATION = 0.005
 """Relative deviation beyond which the white paper's level is worse than the light's own from frame to frame."""
+_ALONE = 64
+"""Rows of square matrices up to which OpenBLAS multiplies them on one thread by itself."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -110,8 +113,7 @@ class LightingTracker:
         self._exposure = _exposure_meter(probe, camera)
         self._frequencies, self._highest = probe.frequencies, probe.order
         self._block_order = _block_orders(probe)
-        # products this small run slower on several threads than on one
-        self._blas = ThreadpoolController().select(user_api="blas")
+        self._blas = ThreadpoolController().select(user_api="blas") if 2 * len(probe.frequencies) > _ALONE else None
         self._choice: OrderChoice | None = None
         self.reset()
 
@@ -136,8 +138,12 @@ class LightingTracker:
         Raises:
             CameraError: the frame's size is not the camera's.
         """
-        with self._blas.limit(limits=1):
+        with self._one_thread():
             return self._update(frame)
+
+    def _one_thread(self) -> AbstractContextManager[object]:
+        """Products this small run slower on several threads than on one."""
+        return nullcontext() if self._blas is None else self._blas.limit(limits=1)
 
     def _update(self, frame: Frame) -> FrameEstimate:
         start = self._clock()
@@ -178,7 +184,7 @@ class LightingTracker:
         assert pose.camera_from_probe is not None
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
         order = self._order_to_measure(frame.time_s)
-        blocks = self._block_order <= order
+        blocks = self._block_order <= order if order < self._highest else None
         last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
             stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
@@ -187,7 +193,9 @@ class LightingTracker:
             )
             measured = self._clock()
             estimate = self._estimator.estimate(means, frame.time_s, nuisance, order)
-            last = estimate if last is None else estimate.with_stripes_elsewhere(blocks, last.stripes)
+            if last is not None and blocks is not None:
+                estimate = estimate.with_stripes_elsewhere(blocks, last.stripes)
+            last = estimate
         assert last is not None
         self._last = last
         return last, measured
@@ -203,7 +211,7 @@ class LightingTracker:
         seen = pose.camera_from_probe is not None
         if self._exposure is not None and raw is not None and pose.camera_from_probe is not None:
             paper = self._exposure.measure(frame, pose.camera_from_probe)
-            if np.all(paper.variance < (_LEVEL_DEVIATION * paper.level) ** 2):
+            if paper.is_known_within(_LEVEL_DEVIATION):
                 self._level = paper.level
         if self._choice is not None and raw is not None and raw.order > self._choice.order:
             raw = raw.truncated(self._choice.order)

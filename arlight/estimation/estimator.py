@@ -31,7 +31,7 @@ ITERATIONS = 2
 """How often a frame's weights and solution are refined after the first frame: with less, a lamp that comes into a block
 spoils the frame; more changes nothing."""
 _FIRST_ITERATIONS = 4
-_native = library(__file__, "guide")
+_native = library(__file__, "guide", keeps_lock=True)
 _native.guide.argtypes = (ctypes.c_void_p,) * 5
 
 
@@ -93,6 +93,7 @@ class LightingEstimator:
             np.where(np.array(kinds) == "clear_white", WHITE_MODEL, MEAN_MODEL),
             probe.paper_reflectance * probe.film_transmittance**2 / np.pi,
         )
+        self._counts: dict[int, int] = {}
         self._resampling = {len(probe.frequencies): resampling(probe, assembly)}
         self._sheet = probe, assembly
 
@@ -115,13 +116,19 @@ class LightingEstimator:
             ProbeError: the sheet does not measure the order.
         """
         start, fit = nuisance or Nuisance(), self._fit
-        count = len(self._frequencies) if order is None else int(np.sum(orders_up_to(self._frequencies, order)))
+        count = len(self._frequencies) if order is None else self._count_up_to(order)
         blocks = fit.begin(count, start)
         self._measured.gather(means, blocks)
         green = self._fit_green(start, blocks)
         chi2 = (fit.fit(0).chi2 + green.chi2 + fit.fit(2).chi2) / CHANNELS
         stripes, reflection = self._guide()
         return Estimate(self._lighting(count, time_s, chi2), stripes, reflection, self._learnt(), green.unexplained)
+
+    def _count_up_to(self, order: int) -> int:
+        """How many frequencies have an order of at most `order`."""
+        if order not in self._counts:
+            self._counts[order] = int(np.sum(orders_up_to(self._frequencies, order)))
+        return self._counts[order]
 
     def _fit_green(self, start: Nuisance, blocks: int) -> FitResult:
         """Fit green from where the last frame left off; a first frame settles, the light's shape among the rest."""
@@ -153,7 +160,7 @@ class LightingEstimator:
     def _learnt(self) -> Nuisance:
         """Where the next frame starts: anew where this one made no sense."""
         fit = self._fit
-        if not np.all(np.isfinite(fit.packed)):
+        if not np.isfinite(fit.packed).all():
             return Nuisance()
         blocks = np.empty((2, len(fit.lamps[GREEN])))
         np.multiply(fit.lamps[GREEN], 1.0 / self._measured.white[GREEN] ** 2, out=blocks[0])
@@ -182,5 +189,6 @@ class LightingEstimator:
 
 def _shape(green: Array) -> Array:
     """Real-packed coefficients relative to L~_0; light is not negative, so none can be larger."""
-    shape: Array = np.clip(green / max(float(green[0]), 1e-6), -1.0, 1.0)
-    return shape
+    shape = green * (1.0 / max(float(green[0]), 1e-6))
+    np.minimum(shape, 1.0, out=shape)
+    return np.maximum(shape, -1.0, out=shape)

@@ -25,7 +25,7 @@ _PLANES = {
     "resolved": 1, "seen": 1, "trust": 1, "cycles": 2, "left": HARMONICS, "left_log": HARMONICS,
     "fineness": HARMONICS, "face": 1, "scratch": 1,
 }  # fmt: skip
-_native = library(__file__, "measured_blocks")
+_native = library(__file__, "measured_blocks", keeps_lock=True)
 
 
 class _MeasuredBlocks(Workspace):

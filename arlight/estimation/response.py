@@ -30,7 +30,7 @@ _LANES = 8
 _PARTS = 2 * STACK_HARMONICS + 1
 _SILENT = 1e-9
 """Light that goes back and forth, relative to the most, below which a harmonic of it counts as nothing."""
-_native = library(__file__, "response")
+_native = library(__file__, "response", keeps_lock=True)
 
 
 class _Response(Workspace):

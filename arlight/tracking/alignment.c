@@ -77,6 +77,27 @@ static void take(double *pose, const double *step)
         pose[9 + k] += step[3 + k];
 }
 
+/* The pose after a share of the motion from `before` to `last`, counted from `last`; half a turn counts as none. */
+EXPORT void extrapolate(const double *before, const double *last, double share, double *pose)
+{
+    double motion[3][3], step[6];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            motion[i][j] = last[3 * i] * before[3 * j] + last[3 * i + 1] * before[3 * j + 1] +
+                           last[3 * i + 2] * before[3 * j + 2];
+    for (int k = 0; k < 3; k++) {
+        int next = (k + 1) % 3, after = (k + 2) % 3;
+        step[k] = 0.5 * (motion[after][next] - motion[next][after]);
+        step[3 + k] = share * (last[9 + k] - before[9 + k]);
+    }
+    double sine = sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]);
+    double angle = atan2(sine, 0.5 * (motion[0][0] + motion[1][1] + motion[2][2] - 1.0));
+    for (int k = 0; k < 3; k++)
+        step[k] *= sine > 1e-12 ? share * angle / sine : share;
+    memcpy(pose, last, 12 * sizeof *pose);
+    take(pose, step);
+}
+
 /* Gauss-Newton at one resolution; 0 where no marker takes part. */
 static int fit(Alignment *a, double blur_px, int shrink, Equations *equations)
 {

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arlight.camera import Camera, Pose
-from arlight.native import Workspace, library
+from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
 from arlight.tracking.lens import camera_parameters
 from arlight.tracking.template import FiducialTemplate
@@ -154,8 +154,7 @@ class AlignmentKernels:
     @property
     def aligned(self) -> Pose:
         """camera_from_probe that `align` found."""
-        pose = self.pose.copy()
-        return Pose(pose[:9].reshape(3, 3), pose[9:])
+        return _pose_of(self.pose.copy())
 
     def draw(self, pose: Pose, blur_px: float) -> None:
         """Draw the templates as they look at a pose, blurred by a standard deviation [px]."""
@@ -170,6 +169,26 @@ class AlignmentKernels:
     def _place(self, pose: Pose) -> None:
         self.pose[:9] = pose.rotation.ravel()
         self.pose[9:] = pose.translation
+
+
+_brief = library(__file__, "alignment", keeps_lock=True)
+_brief.extrapolate.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+_brief.extrapolate.restype = None
+
+
+def extrapolate(before: Pose, last: Pose, share: float) -> Pose:
+    """The pose after a share of the motion from one pose to another, counted from the latter; half a turn is none."""
+    poses = np.empty((3, 12))
+    for row, pose in zip(poses, (before, last), strict=False):
+        row[:9], row[9:] = pose.rotation.ravel(), pose.translation
+    at = address(poses, np.float64)
+    _brief.extrapolate(at, at + poses.strides[0], share, at + 2 * poses.strides[0])
+    return _pose_of(poses[2])
+
+
+def _pose_of(numbers: Array) -> Pose:
+    """Of (12,) rotation row by row and translation."""
+    return Pose(numbers[:9].reshape(3, 3), numbers[9:])
 
 
 def _constants(template: FiducialTemplate, probe: Probe, camera: Camera) -> dict[str, NDArray[np.generic]]:

@@ -20,6 +20,8 @@ typedef int32_t Columns __attribute__((vector_size(4 * STEP), aligned(4), may_al
 typedef uint16_t Pairs1 __attribute__((vector_size(2 * STEP), aligned(1), may_alias));
 typedef uint32_t Pairs2 __attribute__((vector_size(4 * STEP), aligned(1), may_alias));
 
+#define FETCHED_PX 64.0f /* half the size of blocks up to which all of one is brought near: two cache lines a row */
+
 static const Columns EACH = {0, 1, 2, 3, 4, 5, 6, 7};
 
 /* What is read of a block's cells: luma, three planes, or chroma and the mean luma of the pixels that share it. */
@@ -201,6 +203,31 @@ static HOT void convert_codes(const Blocks *b, int plane, int total, float *valu
         convert(total, codes, 1, offset, scale, values);
     else
         convert(total, codes, 2, offset, scale, values);
+}
+
+/* Fetches one plane's part of a box of pixels, given by its middle and half its size. */
+INLINE void fetch_rows(const Blocks *b, int plane, const float *box)
+{
+    float across = plane ? 1.0f / (float)(1 << b->shift_x) : 1.0f, down = plane ? 1.0f / (float)(1 << b->shift_y) : 1.0f;
+    int64_t n = b->blocks, left = (int64_t)((box[0] - box[2 * n]) * across) * b->bytes;
+    int64_t right = (int64_t)((box[0] + box[2 * n]) * across) * b->bytes;
+    int last = (int)((box[n] + box[3 * n]) * down);
+    for (int y = (int)((box[n] - box[3 * n]) * down); y <= last; y++) {
+        const char *row = b->planes[plane] + y * b->stride[plane];
+        __builtin_prefetch(row + left);
+        __builtin_prefetch(row + right);
+    }
+}
+
+/* Has what the first planes hold of a block brought near while others are worked on: a picture that was just decoded
+ * lies far from the processor. Of large blocks few pixels are read. */
+INLINE void fetch_block(const Blocks *b, int block, int planes)
+{
+    const float *box = b->box + block;
+    if (box[2 * b->blocks] * (float)b->bytes > FETCHED_PX || box[3 * b->blocks] > FETCHED_PX)
+        return;
+    for (int plane = 0; plane < planes; plane++)
+        fetch_rows(b, plane, box);
 }
 
 /* Lists the cells of a block, `limit` at most, and the planes' values; for CELLS Cb and Cr, and their mean luma in the

@@ -2,6 +2,8 @@
 #include "block_lamps.h"
 #include "block_view.h"
 
+#define AHEAD 2 /* blocks */
+
 /* Lists the blocks to measure: white ones first, then by harmonics. Returns their number. */
 static int put_in_order(const Blocks *b, int *whites)
 {
@@ -22,8 +24,10 @@ static int put_in_order(const Blocks *b, int *whites)
 static void read_chroma(const Blocks *b, int count, int limited, Chroma *chroma)
 {
     Grid grid = grid_of(b, 1);
-    for (int at = 0; at < count; at++)
+    for (int at = 0; at < count; at++) {
+        fetch_block(b, b->order[at + AHEAD < count ? at + AHEAD : count - 1], CHANNELS);
         sum_cells(b, b->order[at], &grid, limited, b->sums + at, chroma + at);
+    }
 }
 
 /* Brings shared chroma to every pixel: coefficients of each block's colour. */
@@ -49,7 +53,7 @@ static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANN
 {
     Grid grid = grid_of(b, 0);
     float mean[MOST_WHITES][CHANNELS];
-    int known = 0;
+    int known = 0, planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : CHANNELS;
     for (int c = 0; c < CHANNELS; c++)
         level[c] = 0.0f;
     for (int at = 0; at < count; at++) {
@@ -57,6 +61,7 @@ static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANN
             for (int c = 0; c < CHANNELS; c++)
                 level[c] = white_level((const float(*)[CHANNELS])mean, known, c);
         int white = at < whites && known < MOST_WHITES;
+        fetch_block(b, b->order[at + AHEAD < count ? at + AHEAD : count - 1], planes);
         Pixels p = usable_pixels(b, at, &grid, level, white ? mean[known] : NULL);
         sum_block(b->harmonics[b->order[at]], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, b->sums + at);
         if (p.total > 0 && p.total == b->gathered[b->order[at]])

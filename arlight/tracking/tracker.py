@@ -11,7 +11,7 @@ from arlight.color import linear_from_encoded
 from arlight.errors import CameraError
 from arlight.probe.design import Probe
 from arlight.tracking.alignment import SAMPLING_VARIANCE_PX2, Alignment, FiducialAlignment
-from arlight.tracking.alignment_kernels import Codes, Picture
+from arlight.tracking.alignment_kernels import Codes, Picture, extrapolate
 from arlight.tracking.fiducials import FiducialDetector
 from arlight.tracking.planar_pose import poses_from_detections
 from arlight.tracking.pose import ProbePose
@@ -196,6 +196,4 @@ def predict(before: Pose, before_s: float, last: Pose, last_s: float, time_s: fl
     """
     elapsed = last_s - before_s
     share = min(max((time_s - last_s) / elapsed, 0.0), 3.0) if elapsed > 0.0 else 0.0
-    motion = Pose(last.rotation @ before.rotation.T, last.translation - before.translation)
-    turned = Pose.from_rvec(share * motion.rvec, np.zeros(3)).rotation
-    return Pose(turned @ last.rotation, last.translation + share * motion.translation)
+    return extrapolate(before, last, share)

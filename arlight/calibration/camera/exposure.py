@@ -21,7 +21,7 @@ from arlight.video.pixel_format import PixelFormat
 
 Array = NDArray[np.float64]
 
-_LIBRARY = library(__file__, "exposure")
+_LIBRARY = library(__file__, "exposure", keeps_lock=True)
 _LIBRARY.measure.argtypes = [
     ctypes.c_void_p, POINTERS[Layout], POINTERS[PictureCodes], *([ctypes.c_int] * 2), *([ctypes.c_void_p] * 2),
 ]  # fmt: skip
@@ -46,6 +46,11 @@ class PaperLevel:
     def valid(self) -> bool:
         """Whether all channels have a level."""
         return bool(np.all(np.isfinite(self.level)))
+
+    def is_known_within(self, deviation: float) -> bool:
+        """Whether the standard deviation of all channels is less than a share of their level."""
+        numbers = zip(self.level.tolist(), self.variance.tolist(), strict=True)
+        return all(variance < (deviation * level) ** 2 for level, variance in numbers)
 
 
 _SCRATCH = ("gain", "values", "used_x", "used_y", "used_ink", "used_light")
