@@ -14,8 +14,8 @@ from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
-_WAITING = 2
-"""Items in a queue: enough to bridge an uneven one, few enough that a live source is not behind."""
+_WAITING = 3
+"""Items in a queue: enough to bridge uneven ones, few enough that a live source is not behind."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
 from arlight.commands.interruption import Interruption
-from arlight.results.frame_loop import FrameStages, Sinks, frame_loop
+from arlight.results.frame_loop import FrameLoop, FrameStages, Sinks
 from arlight.results.statistics import RunStatistics
 from arlight.video.frame import Frame
 
@@ -42,7 +42,7 @@ def run_frames(
     with (
         Interruption() as interruption,
         FrameProgress(work) as progress,
-        frame_loop(frames, pipeline, sinks, work.source) as records,
+        FrameLoop(frames, pipeline, sinks, work.source) as records,
     ):
         for record in records:
             statistics.add(record)

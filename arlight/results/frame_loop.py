@@ -1,6 +1,6 @@
 """The frame loop in threads: frames from their source through the pipeline into the files, one record a frame."""
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from math import nan
 from time import perf_counter
@@ -63,60 +63,66 @@ class Sinks:
             self.video.close()
 
 
-def frame_loop(
-    frames: Iterable[Frame], pipeline: FrameStages, sinks: Sinks, source: str = "decode"
-) -> Chain[LogRecord]:
+class FrameLoop:
     """The loop, to be started by a `with` block and driven by taking its records.
 
-    Decoding, estimating, relighting (which alone touches OpenGL) and writing have a thread each. A record comes when
-    its frame is in the files.
-
-    Args:
-        frames: in order.
-        pipeline: what is done with each.
-        sinks: where the results go; to be closed after the loop.
-        source: name of the stage that the frames come from.
+    Decoding, estimating and relighting (which alone touches OpenGL) have a thread each; writing is done by the thread
+    that takes the records. A record comes when its frame is in the files.
     """
-    work = _FrameWork(pipeline, sinks, source)
-    stages = [
-        Stage("estimate", work.estimate),
-        Stage("relight", work.relight, pipeline.release),
-        Stage("write", work.write),
-    ]
-    return Chain(_timed(frames), stages)
 
+    def __init__(self, frames: Iterable[Frame], pipeline: FrameStages, sinks: Sinks, source: str = "decode") -> None:
+        """Prepare the threads.
 
-@dataclass(slots=True)
-class _FrameWork:
-    """What the threads do; what they hand on carries the seconds that the source took."""
+        Args:
+            frames: in order.
+            pipeline: what is done with each.
+            sinks: where the results go; to be closed after the loop.
+            source: name of the stage that the frames come from.
+        """
+        self._pipeline, self._sinks, self._source = pipeline, sinks, source
+        stages = [Stage("estimate", self._estimate), Stage("relight", self._relight, pipeline.release)]
+        self._chain: Chain[tuple[FrameResult, float]] = Chain(_timed(frames), stages)
+        self._finished_s = nan
 
-    pipeline: FrameStages
-    sinks: Sinks
-    source: str
-    finished_s: float = nan
-    """Clock when the last frame was in the files [s]."""
+    def stop(self) -> None:
+        """Take no more frames; the records of those already taken still come."""
+        self._chain.stop()
 
-    def estimate(self, taken: tuple[Frame, float]) -> tuple[Frame, float, FrameEstimate]:
+    def __enter__(self) -> "FrameLoop":
+        self._chain.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._chain.__exit__(kind, error, trace)
+
+    def __iter__(self) -> Iterator[LogRecord]:
+        for result, source_s in self._chain:
+            yield self._write(result, source_s)
+
+    # what the threads hand on carries the seconds that the source took
+
+    def _estimate(self, taken: tuple[Frame, float]) -> tuple[Frame, float, FrameEstimate]:
         frame, source_s = taken
-        return frame, source_s, self.pipeline.estimate(frame)
+        return frame, source_s, self._pipeline.estimate(frame)
 
-    def relight(self, estimated: tuple[Frame, float, FrameEstimate]) -> tuple[FrameResult, float]:
+    def _relight(self, estimated: tuple[Frame, float, FrameEstimate]) -> tuple[FrameResult, float]:
         frame, source_s, estimate = estimated
-        return self.pipeline.relight(frame, estimate), source_s
+        return self._pipeline.relight(frame, estimate), source_s
 
-    def write(self, relit: tuple[FrameResult, float]) -> LogRecord:
-        result, source_s = relit
-        timings = {self.source: source_s, **result.timings_s}
-        if self.sinks.video is not None and result.pose.status != "left out":
+    def _write(self, result: FrameResult, source_s: float) -> LogRecord:
+        timings = {self._source: source_s, **result.timings_s}
+        if self._sinks.video is not None and result.pose.status != "left out":
             started = perf_counter()
-            self.sinks.video.write(result.composite)
+            self._sinks.video.write(result.composite)
             timings["encode"] = perf_counter() - started
-        before, self.finished_s = self.finished_s, perf_counter()
-        record = LogRecord.of(result.estimate, timings, self.finished_s - before)
-        if self.sinks.log is not None:
-            self.sinks.log.write(record)
-        if self.sinks.report is not None:
-            self.sinks.report.add(record, result.composite)
+        before, self._finished_s = self._finished_s, perf_counter()
+        record = LogRecord.of(result.estimate, timings, self._finished_s - before)
+        if self._sinks.log is not None:
+            self._sinks.log.write(record)
+        if self._sinks.report is not None:
+            self._sinks.report.add(record, result.composite)
         return record
 
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from arlight.chain import Chain, Stage
+from arlight.chain import Chain
+from arlight.video.frame import Frame
 from arlight.video.reader import VideoReader
 from arlight.video.writer import VideoWriter
 
@@ -23,9 +24,13 @@ def plain_transcode(clip: Path, output: Path, crf: int, preset: str) -> int:
         VideoError: the clip cannot be read.
         OutputError: the copy cannot be written.
     """
+    count = 0
     with (
         VideoReader(clip) as reader,
         VideoWriter(output, like=reader, crf=crf, preset=preset) as writer,
-        Chain[None](reader, [Stage("write", writer.write)]) as written,
+        Chain[Frame](reader, []) as frames,
     ):
-        return sum(1 for _ in written)
+        for frame in frames:
+            writer.write(frame)
+            count += 1
+    return count

@@ -14,7 +14,7 @@ from arlight.fourier import half_plane_frequencies
 from arlight.lighting_tracker import FrameEstimate
 from arlight.optics import Slab
 from arlight.pipeline import FrameResult
-from arlight.results.frame_loop import Sinks, frame_loop
+from arlight.results.frame_loop import FrameLoop, Sinks
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.results.report import ReportRecorder
@@ -77,7 +77,7 @@ class Sink:
 
 def run(source, stages, video, log):
     records = []
-    with Sinks(video=video, log=log) as sinks, frame_loop(source, stages, sinks, "decode") as loop:
+    with Sinks(video=video, log=log) as sinks, FrameLoop(source, stages, sinks, "decode") as loop:
         records.extend(loop)
     return records
 
@@ -137,7 +137,7 @@ def test_files_are_in_step_whatever_the_consumer_does(ending):
     video, log = Sink(), Sink()
 
     def consume():
-        with Sinks(video=video, log=log) as sinks, frame_loop(frames(1000), Stages(), sinks) as loop:
+        with Sinks(video=video, log=log) as sinks, FrameLoop(frames(1000), Stages(), sinks) as loop:
             for record in loop:
                 if record.frame == 20:
                     if ending == "error":
@@ -181,7 +181,7 @@ def test_memory_does_not_grow_with_the_clip(tmp_path):
         log = LightingLogWriter(tmp_path / "log.jsonl", header)
         with (
             Sinks(Forget(), log, ReportRecorder(header)) as sinks,
-            frame_loop(frames(3_000), Lit(), sinks) as loop,
+            FrameLoop(frames(3_000), Lit(), sinks) as loop,
         ):
             for record in loop:
                 statistics.add(record)

@@ -11,7 +11,7 @@ from arlight.benchmark.speed.workloads import FRAME_RATE
 from arlight.pipeline import Pipeline
 from arlight.presets import EncodingSettings, Preset
 from arlight.rendering.relight import Relighter
-from arlight.results.frame_loop import Sinks, frame_loop
+from arlight.results.frame_loop import FrameLoop, Sinks
 from arlight.results.log import LightingLogWriter
 from arlight.results.record import LogHeader
 from arlight.video.reader import VideoReader
@@ -90,7 +90,7 @@ def _run(
             )
             header = LogHeader.of(clip.probe, clip.camera, path.name, "probe.json")
             sinks.log = LightingLogWriter(folder / "light.jsonl", header)
-            with frame_loop(reader, pipeline, sinks) as records:
+            with FrameLoop(reader, pipeline, sinks) as records:
                 for record in records:
                     for stage, ms in record.timings_ms.items():
                         stages_ms.setdefault(stage, []).append(ms)
