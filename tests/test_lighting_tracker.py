@@ -269,7 +269,7 @@ def test_the_order_follows_what_is_shown_and_what_an_effort_allows(film):
     count = 2 * len(PROBE.frequencies) - 1
     order = np.repeat(frequency_order(PROBE.frequencies), 2)[1:]
     tracker = LightingTracker(PROBE, CAMERA)
-    tracker.require(Need(np.eye(count), np.where(order < 2, 1.0, 1e-9), 0.04))
+    tracker.require(Need(np.eye(count), np.diag(np.where(order < 2, 1.0, 1e-9)), 0.04))
     frames = [synthetic.frame for synthetic in film()] * 6
     orders = []
     for index, frame in enumerate(frames):

@@ -137,7 +137,7 @@ def test_the_effort_that_a_budget_allows_reaches_both_halves(probe, frames):
 
 def test_what_the_object_shows_decides_the_order(probe, frames):
     count = 2 * len(probe.frequencies) - 1
-    need = Need(np.eye(count), np.where(np.arange(count) == 0, 1.0, 1e-12), 0.04)
+    need = Need(np.eye(count), np.diag(np.where(np.arange(count) == 0, 1.0, 1e-12)), 0.04)
     pipeline = Pipeline(probe, CAMERA, MarkingRelighter(need))
     orders = [
         pipeline.process(replace(frame, index=index, time_s=0.04 * index)).lighting.order

@@ -177,8 +177,7 @@ class Relighter:
     def need(self) -> Need:
         """What of the light the object shows, from which the order that it requires follows."""
         independent = self._reconstruction.independent
-        shown = np.einsum("ij,ik,kj->j", independent, self.appearance.gram, independent, optimize=True)
-        return Need(independent, np.maximum(shown, 0.0), _TOLERANCE)
+        return Need(independent, independent.T @ self.appearance.gram @ independent, _TOLERANCE)
 
     def release(self) -> None:
         """Give back what drawing holds, from the thread that renders; it is made again when needed."""
