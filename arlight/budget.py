@@ -1,8 +1,9 @@
 """Holds a deadline: moves along a ladder of efforts by the time that frames took.
 
 A ladder lists points of the measured front of cost against error, the best first, each with what it costs relative to
-the first. Every frame's time, divided by the cost of its rung, says how fast the machine is now; the rung is the best
-one that nearly all frames of late would have made in time. When even the cheapest is too slow, frames are left out.
+the first. Times of late frames, divided by the costs of their rungs, say how fast the machine is now, and what single
+frames took beyond that how often it is interrupted. The rung is the best one that nearly all frames would have made in
+time. When even the cheapest is too slow, frames are left out.
 """
 
 from collections import deque
@@ -55,6 +56,7 @@ class BudgetController:
         self.ladder = tuple(ladder)
         self._costs = np.array([[rung.estimate_cost, rung.draw_cost] for rung in ladder])
         self._speeds: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
+        self._places: deque[int] = deque(maxlen=_REMEMBERED)
         self._place = 0
         self._wait = _LOOK_EVERY
         self._doubt = np.ones(len(ladder), int)
@@ -89,25 +91,31 @@ class BudgetController:
             # acquires the sheet and waits for the object: tells nothing about the others
             return
         self._speeds.append(np.array([estimate_s, draw_s]) / self._costs[place])
+        self._places.append(place)
         cheapest = self._place == len(self.ladder) - 1
         owed = min(max(self._owed + total - self.budget_s, 0.0), _MOST_OWED * self.budget_s)
         self._owed = owed if cheapest else 0.0
         self._wait -= 1
         expected = self._expected()
         if expected[self._place] > self.budget_s and not cheapest:
-            self._fall(expected)
+            self._fall()
         elif self._wait <= 0:
             self._rise(expected)
 
     def _expected(self) -> NDArray[np.float64]:
-        """(rungs,) time that nearly all frames of late would have stayed within [s]."""
-        return np.quantile(np.array(self._speeds) @ self._costs.T, _IN_TIME, axis=0)
+        """(rungs,) time that nearly all frames would stay within, were interruptions to cost any rung the same [s]."""
+        speeds = np.array(self._speeds)
+        usual = self._costs @ np.median(speeds, axis=0)
+        beyond = np.sum(speeds * self._costs[self._places], axis=1) - usual[self._places]
+        return np.asarray(usual + np.quantile(beyond, _IN_TIME), float)
 
-    def _fall(self, expected: NDArray[np.float64]) -> None:
+    def _fall(self) -> None:
+        """To the best rung that fits if the slowness lasts, and costs any rung its share."""
         self._doubt[self._place] = min(2 * self._doubt[self._place], _LONGEST_DOUBT)
-        cheaper = np.arange(len(expected)) > self._place
-        fits = np.flatnonzero(cheaper & (expected <= self.budget_s))
-        self._move(int(fits[0]) if len(fits) else len(expected) - 1)
+        slow = np.quantile(np.array(self._speeds) @ self._costs.T, _IN_TIME, axis=0)
+        cheaper = np.arange(len(slow)) > self._place
+        fits = np.flatnonzero(cheaper & (slow <= self.budget_s))
+        self._move(int(fits[0]) if len(fits) else len(slow) - 1)
 
     def _rise(self, expected: NDArray[np.float64]) -> None:
         if self._place == 0 or expected[self._place - 1] > _ROOM * self.budget_s:

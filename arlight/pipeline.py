@@ -86,6 +86,11 @@ class Pipeline:
         self._budget = budget
         self._need_is_known = relighter is None
 
+    @property
+    def has_deadline(self) -> bool:
+        """Whether frames are to be done within a budget of time."""
+        return self._budget is not None
+
     def process(self, frame: Frame) -> FrameResult:
         """Track the sheet, estimate its light, draw the object under that light.
 

@@ -77,7 +77,7 @@ def _process(
         )
         if "--lighting" in outputs:
             sinks.log = LightingLogWriter(outputs["--lighting"].growing, header)
-        work = Work("demo", settings.frame_count, source="synthesise")
+        work = Work("demo", settings.frame_count, source="synthesise", deadline=pipeline.has_deadline)
         return run_frames(_frames(settings, probe), pipeline, sinks, statistics, work)
 
 

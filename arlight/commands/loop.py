@@ -1,6 +1,8 @@
 """Frames through the pipeline into the outputs, with progress, until they end or Ctrl-C."""
 
-from collections.abc import Iterable
+import gc
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rich.console import Console
@@ -22,6 +24,8 @@ class Work:
     """Frames to expect; None where that is not known."""
     source: str = "decode"
     """Name of the stage that the frames come from."""
+    deadline: bool = False
+    """Whether each frame is to be done in time, rather than all of them soon."""
 
 
 def run_frames(
@@ -42,7 +46,8 @@ def run_frames(
     with (
         Interruption() as interruption,
         FrameProgress(work) as progress,
-        FrameLoop(frames, pipeline, sinks, work.source) as records,
+        settled_memory(),
+        FrameLoop(frames, pipeline, sinks, work.source, work.deadline) as records,
     ):
         for record in records:
             statistics.add(record)
@@ -50,6 +55,17 @@ def run_frames(
             if interruption.requested:
                 records.stop()
     return interruption.requested
+
+
+@contextmanager
+def settled_memory() -> Iterator[None]:
+    """What was made before the `with` block is not searched for garbage within it: that would hold up frames."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 class FrameProgress:

@@ -102,7 +102,8 @@ def _process(
         if "--report" in outputs:
             sinks.report = ReportRecorder(header)
         reader = footage.reader
-        interrupted = run_frames(reader, pipeline, sinks, statistics, Work(options.clip.name, reader.frame_count))
+        work = Work(options.clip.name, reader.frame_count, deadline=pipeline.has_deadline)
+        interrupted = run_frames(reader, pipeline, sinks, statistics, work)
     if sinks.report is not None:
         sinks.report.write(outputs["--report"].growing, statistics)
     return interrupted

@@ -1,8 +1,10 @@
 """The frame loop in threads: frames from their source through the pipeline into the files, one record a frame."""
 
 from collections.abc import Generator, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from math import nan
+from threading import Lock
 from time import perf_counter
 from types import TracebackType
 from typing import Protocol
@@ -70,7 +72,14 @@ class FrameLoop:
     that takes the records. A record comes when its frame is in the files.
     """
 
-    def __init__(self, frames: Iterable[Frame], pipeline: FrameStages, sinks: Sinks, source: str = "decode") -> None:
+    def __init__(
+        self,
+        frames: Iterable[Frame],
+        pipeline: FrameStages,
+        sinks: Sinks,
+        source: str = "decode",
+        deadline: bool = False,
+    ) -> None:
         """Prepare the threads.
 
         Args:
@@ -78,10 +87,15 @@ class FrameLoop:
             pipeline: what is done with each.
             sinks: where the results go; to be closed after the loop.
             source: name of the stage that the frames come from.
+            deadline: whether a frame in work matters more than how many there are: estimating and relighting then
+                share a thread, and decoding and writing take turns, so that of two processors one is for the frame.
         """
         self._pipeline, self._sinks, self._source = pipeline, sinks, source
+        self._coding: AbstractContextManager[object] = Lock() if deadline else nullcontext()
         stages = [Stage("estimate", self._estimate), Stage("relight", self._relight, pipeline.release)]
-        self._chain: Chain[tuple[FrameResult, float]] = Chain(_timed(frames), stages)
+        if deadline:
+            stages = [Stage("frame", lambda taken: self._relight(self._estimate(taken)), pipeline.release)]
+        self._chain: Chain[tuple[FrameResult, float]] = Chain(self._timed(frames), stages)
         self._finished_s = nan
 
     def stop(self) -> None:
@@ -114,9 +128,10 @@ class FrameLoop:
     def _write(self, result: FrameResult, source_s: float) -> LogRecord:
         timings = {self._source: source_s, **result.timings_s}
         if self._sinks.video is not None and result.pose.status != "left out":
-            started = perf_counter()
-            self._sinks.video.write(result.composite)
-            timings["encode"] = perf_counter() - started
+            with self._coding:
+                started = perf_counter()
+                self._sinks.video.write(result.composite)
+                timings["encode"] = perf_counter() - started
         before, self._finished_s = self._finished_s, perf_counter()
         record = LogRecord.of(result.estimate, timings, self._finished_s - before)
         if self._sinks.log is not None:
@@ -125,16 +140,19 @@ class FrameLoop:
             self._sinks.report.add(record, result.composite)
         return record
 
-
-def _timed(frames: Iterable[Frame]) -> Generator[tuple[Frame, float], None, None]:
-    """Every frame with the seconds that its source took for it; a source that can be closed is."""
-    iterator = iter(frames)
-    try:
-        started = perf_counter()
-        for frame in iterator:
-            yield frame, perf_counter() - started
-            started = perf_counter()
-    finally:
-        close = getattr(iterator, "close", None)
-        if close is not None:
-            close()
+    def _timed(self, frames: Iterable[Frame]) -> Generator[tuple[Frame, float], None, None]:
+        """Every frame with the seconds that its source took for it; a source that can be closed is."""
+        iterator = iter(frames)
+        try:
+            while True:
+                with self._coding:
+                    started = perf_counter()
+                    frame = next(iterator, None)
+                    source_s = perf_counter() - started
+                if frame is None:
+                    return
+                yield frame, source_s
+        finally:
+            close = getattr(iterator, "close", None)
+            if close is not None:
+                close()

@@ -2,6 +2,7 @@
 
 import gc
 import threading
+import time
 import tracemalloc
 
 import numpy as np
@@ -75,17 +76,18 @@ class Sink:
         self.closed += 1
 
 
-def run(source, stages, video, log):
+def run(source, stages, video, log, deadline=False):
     records = []
-    with Sinks(video=video, log=log) as sinks, FrameLoop(source, stages, sinks, "decode") as loop:
+    with Sinks(video=video, log=log) as sinks, FrameLoop(source, stages, sinks, "decode", deadline) as loop:
         records.extend(loop)
     return records
 
 
+@pytest.mark.parametrize("deadline", [False, True])
 @pytest.mark.parametrize("count", [0, 1, 2, 30])
-def test_every_frame_is_written_and_logged_once_in_order(count):
+def test_every_frame_is_written_and_logged_once_in_order(count, deadline):
     video, log, stages = Sink(), Sink(), Stages()
-    records = run(frames(count), stages, video, log)
+    records = run(frames(count), stages, video, log, deadline)
     assert [frame.index for frame in video.items] == list(range(count))
     assert all(frame.planes[0][0, 0] == 1 for frame in video.items)
     assert log.items == records
@@ -98,6 +100,32 @@ def test_relighting_has_one_thread_that_gives_back_what_it_holds():
     run(frames(5), stages, Sink(), Sink())
     assert stages.threads["release"] == stages.threads["relight"]
     assert stages.threads["relight"] not in (stages.threads["estimate"], threading.get_ident())
+
+
+def test_with_a_deadline_a_frame_has_one_thread_and_decoding_and_writing_take_turns():
+    under_way, together = [], []
+
+    def alone():
+        under_way.append(threading.get_ident())
+        time.sleep(0.002)
+        together.append(len(under_way))
+        under_way.pop()
+
+    def source():
+        for frame in frames(20):
+            alone()
+            yield frame
+
+    class SlowSink(Sink):
+        def write(self, item):
+            alone()
+            super().write(item)
+
+    stages, video = Stages(), SlowSink()
+    run(source(), stages, video, Sink(), deadline=True)
+    assert stages.threads["relight"] == stages.threads["estimate"] == stages.threads["release"]
+    assert len(video.items) == 20
+    assert max(together) == 1
 
 
 def test_a_record_has_the_time_of_every_stage_and_of_the_whole():
