@@ -1,11 +1,12 @@
 """The lighting value: Fourier coefficients of the received light with their covariance."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.fourier import frequency_order, orders_up_to
+from arlight.fourier import orders_up_to
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,9 @@ class Lighting:
     @property
     def order(self) -> int:
         """Highest order |n| in use."""
-        return int(frequency_order(self.frequencies).max())
+        # the smallest integer not below the root, in integers: it is asked for in every frame
+        squared = int(np.einsum("ij,ij->i", self.frequencies, self.frequencies).max())
+        return math.isqrt(squared - 1) + 1 if squared else 0
 
     def truncated(self, order: int) -> "Lighting":
         """The same light with the frequencies up to an order alone; what is left keeps its error bars.

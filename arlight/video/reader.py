@@ -120,7 +120,7 @@ class VideoReader:
 
     def _pictures(self, container: InputContainer, stream: VideoStream) -> Iterator[av.VideoFrame]:
         """Decoded pictures up to the end or the damage; corrupt ones are left out."""
-        broken, decoded, end_s = 0, 0, 0.0
+        broken, decoded, end = 0, 0, 0
         packets = container.demux(stream)
         while True:
             try:
@@ -142,9 +142,9 @@ class VideoReader:
                     continue
                 decoded += 1
                 if picture.pts is not None:
-                    end_s = float((picture.pts + picture.duration) * self.time_base)
+                    end = picture.pts + picture.duration
                 yield picture
-        expected_s = _expected_end_s(stream)
+        expected_s, end_s = _expected_end_s(stream), float(end * self.time_base)
         if decoded and expected_s is not None and end_s + 2.0 / self.frame_rate < expected_s:
             cut = f"ends at {end_s:.2f} s instead of {expected_s:.2f} s, it is cut off"
             self.damage = f"{self.damage}; {cut}" if self.damage else f"{self.path}: {cut}"
@@ -163,9 +163,9 @@ class VideoReader:
                 f"{self.path}: expected pictures of {self._layout} throughout, found {layout} at frame {index}; "
                 "cut the video where it changes"
             )
-        time = index / self.frame_rate if picture.pts is None else picture.pts * (picture.time_base or self.time_base)
+        time_s = float(index / self.frame_rate) if picture.time is None else picture.time
         planes, format_ = upright(planes_of(picture, self._format), self._format, picture.rotation)
-        return Frame(index, float(time), planes, format_)
+        return Frame(index, time_s, planes, format_)
 
 
 def planes_of(picture: av.VideoFrame, format_: PixelFormat) -> Planes:

@@ -2,6 +2,7 @@
 
 import re
 from fractions import Fraction
+from functools import cache
 from typing import NamedTuple
 
 import av
@@ -67,6 +68,7 @@ def tags_of(format_: PixelFormat, source: ColourTags | None) -> ColourTags:
     return ColourTags(matrix, FULL_RANGE if format_.full_range else 1, transfer, source.primaries if source else 1)
 
 
+@cache
 def planar_name(name: str) -> str:
     """The layout with one plane a component and at least the same depth that stands for a layout.
 
