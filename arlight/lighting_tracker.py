@@ -154,8 +154,10 @@ class LightingTracker:
         raw = None if estimate is None else estimate.lighting
         estimated = self._clock()
         lighting = self._filtered(raw, frame, pose) if self.settings.filtered else raw
-        if self._choice is not None and raw is not None and lighting is not None:
-            self._choice.learn(raw, lighting, frame.time_s)
+        if self._choice is not None and lighting is not None:
+            if raw is not None:
+                self._choice.learn(raw, lighting, frame.time_s)
+            lighting = self._choice.shown(lighting)
         timings = {
             "track": tracked - start,
             "measure": measured - tracked,

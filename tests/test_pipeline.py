@@ -141,7 +141,7 @@ def test_what_the_object_shows_decides_the_order(probe, frames):
     pipeline = Pipeline(probe, CAMERA, MarkingRelighter(need))
     orders = [
         pipeline.process(replace(frame, index=index, time_s=0.04 * index)).lighting.order
-        for index, frame in enumerate(frames * 6)
+        for index, frame in enumerate(frames * 10)
     ]
     assert orders[0] == 1
     assert orders[-1] == 0

@@ -16,17 +16,17 @@ less saves work, so the lowest order is chosen that costs next to nothing.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arlight.estimation.lighting import Lighting
-from arlight.fourier import frequency_order, pack_real
+from arlight.fourier import frequency_order, pack_real, unpack_real
 
 Array = NDArray[np.float64]
 
-_LOOK_EVERY_S = 1.0
+_LOOK_EVERY_S = 2.0
 """Time after which all orders are measured once more [s]."""
 _JUDGE_EVERY_S = 0.8
 """Time between two frames in which the order is thought over, half of it where a lower one may do [s]."""
@@ -46,6 +46,8 @@ _STANDS_OUT = 4.0
 all orders to be followed again; twice as many after every time that it was in vain."""
 _LOWER_AFTER_S = 0.8
 """Time for which a lower order must have sufficed before it is taken [s]."""
+_FADE_S = 0.5
+"""Time in which orders come and go, so that no frame differs visibly from the last [s]."""
 _KEPT = 0.95
 """Of the most that frames showed, from one time that the order is thought over to the next."""
 _DARKEST = 1e-3
@@ -80,7 +82,7 @@ class OrderChoice:
         order = frequency_order(frequencies)
         self.highest = int(order.max())
         """Order of the sheet."""
-        self._tolerance = need.tolerance
+        self._tolerance, self._independent = need.tolerance, need.independent
         # of variance 1 in natural light of level 1
         self._parts = np.asarray(np.linalg.inv(need.independent) * need.independent[0, 0])
         # single precision: a choice among a few
@@ -91,7 +93,9 @@ class OrderChoice:
     def reset(self) -> None:
         """Forget the light."""
         self.order = self.highest
-        """Highest order that the scene requires."""
+        """Highest order that is followed."""
+        self._core, self._share, self._leaving = self.highest, 1.0, False
+        self._learnt_s = -math.inf
         self._left_out = 0.0
         self._model = 1.0, 1.0
         self._doubt = _STANDS_OUT
@@ -110,9 +114,12 @@ class OrderChoice:
 
         Not every frame is worth the work.
         """
+        self._fade(time_s)
         if len(seen.frequencies) > len(filtered.frequencies):
             self._looked_s = time_s
             self._look(seen)
+        if self._share < 1.0 or self._leaving:
+            return
         if self.order < self.highest and not 0.0 <= time_s - self._watched_s < _WATCH_EVERY_S:
             self._watched_s = time_s
             self._watch(filtered)
@@ -120,6 +127,28 @@ class OrderChoice:
         if not 0.0 <= time_s - self._judged_s < soon * _JUDGE_EVERY_S:
             self._judged_s = time_s
             self._judge(seen, filtered, time_s)
+
+    def shown(self, filtered: Lighting) -> Lighting:
+        """The filtered lighting, of which orders that come or go are there in part; error bars as they were."""
+        if 2 * len(filtered.frequencies) - 1 > self._ends[self.order]:
+            filtered = filtered.truncated(self.order)
+        first, n = self._ends[self._core], 2 * len(filtered.frequencies) - 1
+        if self._share == 1.0 or n <= first:
+            return filtered
+        packed = pack_real(filtered.coefficients)
+        beyond = self._parts[first:n, :n] @ packed / self._independent[0, 0]
+        hidden = (1.0 - self._share) * (self._independent[:n, first:n] @ beyond)
+        return replace(filtered, coefficients=unpack_real(packed - hidden))
+
+    def _fade(self, time_s: float) -> None:
+        """Let the orders beyond the core come or go by what they may since the last frame."""
+        step = min(max(time_s - self._learnt_s, 0.0) / _FADE_S, 1.0)
+        self._learnt_s = time_s
+        self._share = min(max(self._share - step if self._leaving else self._share + step, 0.0), 1.0)
+        if self._leaving and self._share == 0.0:
+            self.order, self._leaving = self._core, False
+        elif not self._leaving and self._share == 1.0:
+            self._core = self.order
 
     def _watch(self, filtered: Lighting) -> None:
         """Follow all orders again if the light is no longer that for which some were left out.
@@ -134,7 +163,9 @@ class OrderChoice:
             self._rise()
 
     def _rise(self) -> None:
+        """Follow all orders, to be seen little by little."""
         self.order, self._left_out, self._fits_since_s, self._rose = self.highest, 0.0, math.inf, True
+        self._share, self._leaving = 0.0, False
 
     def _look(self, seen: Lighting) -> None:
         """Follow all orders again if one frame shows more of them than any did before they were left out.
@@ -147,7 +178,7 @@ class OrderChoice:
         errors = self._shown[first:n, first:n] @ covariance[first:, first:]
         # of a quadratic form of normal errors
         chance = math.sqrt(2.0 * float(np.sum(errors * errors.T)))
-        if more > self._doubt * chance + self._left_out:
+        if not self._leaving and more > self._doubt * chance + self._left_out:
             self._rise()
 
     def _judge(self, seen: Lighting, filtered: Lighting, time_s: float) -> None:
@@ -167,7 +198,8 @@ class OrderChoice:
             self._left_out += float(squared_error[lowest] - squared_error.min())
             self._doubt *= 2.0 if self._rose else 1.0
             self._strength, self._unsure = self._strength_of(filtered.truncated(lowest)), float(squared_error.min())
-            self.order, self._fits_since_s, self._rose = lowest, math.inf, False
+            self._fits_since_s, self._rose = math.inf, False
+            self._core, self._share, self._leaving = lowest, 1.0, True
 
     def _squared_errors(self, filtered: Lighting) -> Array:
         """(order + 1,) expected squared error of what is shown with the light up to an order."""
