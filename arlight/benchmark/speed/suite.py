@@ -15,6 +15,7 @@ from arlight.benchmark.speed.front import measure_front
 from arlight.benchmark.speed.front_settings import front_settings
 from arlight.benchmark.speed.loop_part import measure_loop
 from arlight.benchmark.speed.memory_part import measure_memory
+from arlight.benchmark.speed.order_part import measure_order
 from arlight.benchmark.speed.playback import FilmedClip, load_clip
 from arlight.benchmark.speed.relighters import Relighters
 from arlight.benchmark.speed.start_part import measure_start
@@ -114,6 +115,7 @@ class Suite:
         parts += [Part(f"loop, {name}", partial(self._loop, name)) for name in (HEADLINE, LARGE)]
         parts += [Part("first result", self._start), Part("bound", self._bound), Part("front", self._front)]
         if not self.quick:
+            parts += [Part(f"order, {name}", partial(self._order, name)) for name in names if name != LARGE]
             parts.append(Part("AprilTags", self._april_tags))
             parts += [Part(f"growth with {axis}", partial(grow, self)) for axis, grow in _GROWTH.items()]
             parts.append(Part("memory", self._memory))
@@ -157,6 +159,9 @@ class Suite:
     def _front(self) -> Findings:
         clips = [self.clip(name) for name in (_FRONT_CLIPS[:1] if self.quick else _FRONT_CLIPS)]
         return measure_front(front_settings(self.quick), clips, self._count(24, 48), self.relighters)
+
+    def _order(self, name: str) -> Findings:
+        return measure_order(self.clip(name), 72, self.relighters)
 
     def _april_tags(self) -> Findings:
         clip = self.clip(APRIL_TAGS.name)

@@ -25,6 +25,8 @@ def benchmark_tables(found: Findings) -> list[Table]:
     if found.details.get("workloads"):
         tables.append(_workload_table(found))
     tables.append(_stage_table(found))
+    if found.details.get("order"):
+        tables.append(_order_table(found))
     if found.details.get("front"):
         tables += [_preset_table(found), _front_table(found)]
     return tables
@@ -86,11 +88,34 @@ def _stage_table(found: Findings) -> Table:
     drawn = {entry["name"] for entry in found.details.get("drawing", [])}
     others = {entry["name"] for entry in found.details.get("workloads", [])} - drawn
     for name, ratio in found.ratios.items():
-        if any(name.endswith(f", {other}") for other in others):
+        if name.startswith("auto over all orders") or any(name.endswith(f", {other}") for other in others):
             continue
         value = ratio.value
         table.add_row(
             name, f"{value.median:.3f}", f"{value.low:.3f}-{value.high:.3f}", ratio.over, f"{ratio.cost_ms:.2f}"
+        )
+    return table
+
+
+def _order_table(found: Findings) -> Table:
+    table = Table(
+        title="order `auto`: error of the lit object over that of the best order, cost over that of all orders"
+    )
+    table.add_column("workload")
+    table.add_column("object")
+    for name in ("best order", "error %", "auto %", "auto over best", "orders taken", "cost"):
+        table.add_column(name, justify="right")
+    for entry in found.details["order"]:
+        best = min(entry["error_by_order"])
+        table.add_row(
+            entry["name"],
+            entry["object"],
+            str(entry["error_by_order"].index(best)),
+            _percent(best),
+            _percent(entry["error_of_auto"]),
+            f"{entry['over_best']:.2f}",
+            ", ".join(f"{order} ({share:.0%})" for order, share in enumerate(entry["orders"]) if share),
+            f"{entry['cost_over_all_orders']:.2f}",
         )
     return table
 
