@@ -3,6 +3,8 @@
 #include "bounded.h"
 #include "../tracking/lens.h"
 
+enum { LANES = 16 }; /* numbers whose bounds are found side by side: x and y in turn */
+
 typedef struct {
     double rotation[9], translation[3]; /* camera from probe, row by row [mm] */
     double lens[25];                    /* as `camera_parameters` has them */
@@ -10,22 +12,33 @@ typedef struct {
     double trusted_radius;              /* beyond this distance from the axis, at depth 1, the lens is not followed */
 } View;
 
-/* Box (x0, y0, x1, y1) of the pixels of those points that are seen; how many they are. */
-static inline int64_t box_of(const float *pixels, const float *depth_mm, int64_t count, float near, float *box)
+/* How many points lie beyond the near plane. */
+INLINE int64_t count_seen(const float *depth_mm, int64_t count, float near)
 {
-    int64_t seen = 0;
-    box[0] = box[1] = INFINITY, box[2] = box[3] = -INFINITY;
+    int32_t seen = 0;
     for (int64_t i = 0; i < count; i++)
-        if (depth_mm[i] > near) {
-            float x = pixels[2 * i], y = pixels[2 * i + 1];
-            box[0] = lesser(x, box[0]), box[1] = lesser(y, box[1]);
-            box[2] = greater(x, box[2]), box[3] = greater(y, box[3]);
-            seen++;
-        }
+        seen += depth_mm[i] > near;
     return seen;
 }
 
-/* Pixels (n, 2) and depths (n,) of points (n, 3) [mm], and the `box_of` them. */
+/* Box (x0, y0, x1, y1) of pixels. */
+INLINE void find_box(const float *pixels, int64_t count, float *box)
+{
+    float low[LANES], high[LANES];
+    for (int k = 0; k < LANES; k++)
+        low[k] = INFINITY, high[k] = -INFINITY;
+    int64_t i = 0;
+    for (; i + LANES <= 2 * count; i += LANES)
+        for (int k = 0; k < LANES; k++)
+            low[k] = lesser(pixels[i + k], low[k]), high[k] = greater(pixels[i + k], high[k]);
+    for (; i < 2 * count; i++)
+        low[i % 2] = lesser(pixels[i], low[i % 2]), high[i % 2] = greater(pixels[i], high[i % 2]);
+    for (int k = 2; k < LANES; k++)
+        low[k % 2] = lesser(low[k], low[k % 2]), high[k % 2] = greater(high[k], high[k % 2]);
+    box[0] = low[0], box[1] = low[1], box[2] = high[0], box[3] = high[1];
+}
+
+/* Pixels (n, 2) and depths (n,) of points (n, 3) [mm], and the pixels' box; how many of them are seen. */
 EXPORT HOT int64_t project_points(
     const View *view, int64_t count, const float *points, float *pixels, float *depth_mm, float *box)
 {
@@ -49,5 +62,6 @@ EXPORT HOT int64_t project_points(
         float px = bent ? bent_x : straight_x, py = bent ? bent_y : straight_y;
         pixels[2 * i] = px, pixels[2 * i + 1] = py, depth_mm[i] = depth;
     }
-    return box_of(pixels, depth_mm, count, near, box);
+    find_box(pixels, count, box);
+    return count_seen(depth_mm, count, near);
 }

@@ -37,7 +37,7 @@ class Projected:
     seen: int
     """How many of the points are beyond the near plane."""
     box_px: tuple[float, float, float, float]
-    """(x0, y0, x1, y1) of those [px]."""
+    """(x0, y0, x1, y1) of the points [px]; means nothing unless all of them are seen."""
 
     def region(self, margin_px: int = 2) -> Region | None:
         """The part of the frame that holds the points and what lies between them; None if there is none.

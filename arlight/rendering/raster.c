@@ -75,48 +75,52 @@ INLINE Four value_at(const Gradient *g, int right, int below)
     return g->first + g->across * (float)right + g->down * (float)below;
 }
 
-/* Of eight samples side by side, in the first row. */
-INLINE void values_from(const Gradient *g, int right, Eight value[4])
+/* Draw eight columns of a triangle, from row to row while `outside` of its edges changes by `step`. */
+INLINE void draw_columns(
+    const Samples *s, int64_t at, int from, int to, const Gradient *g, int right, EightBits outside[3],
+    const int32_t step[3])
 {
-    for (int c = 0; c < 4; c++)
-        value[c] = g->first[c] + g->across[c] * __builtin_convertvector(right + COLUMN, Eight);
+    Eight first[4], down[4];
+    for (int c = 0; c < 4; c++) {
+        first[c] = g->first[c] + g->across[c] * __builtin_convertvector(right + COLUMN, Eight);
+        down[c] = all(g->down[c]);
+    }
+    float *samples = s->planes + at;
+    for (int below = from; below < to; below++, samples += s->width) {
+        Eight value[4];
+        for (int c = 0; c < 4; c++)
+            value[c] = first[c] + down[c] * (float)below;
+        put(samples, s->plane, outside[0] | outside[1] | outside[2], value);
+        for (int i = 0; i < 3; i++)
+            outside[i] += step[i];
+    }
 }
 
-/* Draw eight samples of a row, of which those of the first row are given. */
-INLINE void put_below(const Samples *s, int64_t at, EightBits outside, const Eight first[4], const Four *down, int below)
-{
-    Eight value[4];
-    for (int c = 0; c < 4; c++)
-        value[c] = first[c] + (*down)[c] * (float)below;
-    put(s, at, outside, value);
-}
-
-/* A triangle inside the picture of which eight samples side by side hold each row. */
+/* A small triangle inside the picture. */
 INLINE void draw_small(const Samples *s, const Triangle *t, const Gradient *g)
 {
     Edges edges = edges_of(t);
-    Eight first[4];
-    values_from(g, 0, first);
     int64_t at = t->top * s->width + t->left;
-    for (int below = 0; below < t->bottom - t->top; below++, at += s->width) {
-        put_below(s, at, edges.outside[0] | edges.outside[1] | edges.outside[2], first, &g->down, below);
+    for (int right = 0; right < t->right - t->left; right += SIDE_BY_SIDE) {
+        EightBits outside[3];
         for (int i = 0; i < 3; i++)
-            edges.outside[i] += edges.down[i];
+            outside[i] = edges.first[i] + edges.across[i] * (right + COLUMN);
+        draw_columns(s, at + right, 0, t->bottom - t->top, g, right, outside, edges.down);
     }
 }
 
 /* Any triangle. */
 INLINE void draw_rows(const Samples *s, const Triangle *t, const Gradient *g)
 {
+    const int32_t still[3] = {0, 0, 0};
     int from, to;
-    Eight first[4];
     for (Rows rows = rows_of(t, (int)s->height); rows.row < rows.end; next_row(&rows)) {
         samples_of_row(&rows, (int)s->width, &from, &to);
         for (int column = from; column < to; column += SIDE_BY_SIDE) {
-            values_from(g, column - t->left, first);
             /* the sign of what is left of the row */
-            EightBits outside = to - column - 1 - COLUMN;
-            put_below(s, rows.row * s->width + column, outside, first, &g->down, rows.row - t->top);
+            EightBits left = to - column - 1 - COLUMN, outside[3] = {left, left, left};
+            int below = rows.row - t->top;
+            draw_columns(s, rows.row * s->width + column, below, below + 1, g, column - t->left, outside, still);
         }
     }
 }
@@ -126,8 +130,9 @@ INLINE Picture picture_of(const Raster *r, const int32_t face[3], float sample_o
 {
     const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
     float u = a->u / a->nearness, v = a->v / a->nearness;
-    float area = (b->u / b->nearness - u) * (c->v / c->nearness - v) - (c->u / c->nearness - u) * (b->v / b->nearness - v);
-    float pixels = fabsf(area * sample_over_area * SNAP) * (float)(r->texture.width * r->texture.height);
+    float bu = b->u / b->nearness - u, bv = b->v / b->nearness - v;
+    float cu = c->u / c->nearness - u, cv = c->v / c->nearness - v;
+    float pixels = fabsf((bu * cv - cu * bv) * sample_over_area * SNAP) * (float)(r->texture.width * r->texture.height);
     return picture_for(&r->texture, (int)(r->texture_place[3 * face[0] + 2] + 0.5f), pixels);
 }
 
@@ -151,14 +156,14 @@ INLINE void draw_textured(const Raster *r, const Triangle *t, const int32_t face
             int64_t at = rows.row * s->width + column;
             int right = column - t->left, below = rows.row - t->top;
             Four body = value_at(g, right, below);
-            if (!(body[3] > s->nearness[at]))
+            if (!(body[3] > s->planes[at]))
                 continue;
             Four uv = value_at(&places, right, below), mirrored = value_at(&glosses, right, below);
             float depth = 1.0f / body[3], colour[3];
             look_up(&r->texture, &picture, uv[0] * depth, uv[1] * depth, colour);
-            s->nearness[at] = body[3];
+            s->planes[at] = body[3];
             for (int c = 0; c < 3; c++)
-                s->radiance[c * s->plane + at] = (body[c] * colour[c] + mirrored[c]) * depth;
+                s->planes[(c + 1) * s->plane + at] = (body[c] * colour[c] + mirrored[c]) * depth;
         }
     }
 }
@@ -183,7 +188,9 @@ INLINE void draw_face(const Raster *r, const int32_t given[3])
     find_box(&t);
     const Samples *s = &r->samples;
     int inside = (t.left >= 0) & (t.top >= 0) & (t.right <= s->width) & (t.bottom <= s->height);
-    if (t.left >= t.right || t.top >= t.bottom || t.right <= 0 || t.bottom <= 0 || t.left >= s->width || t.top >= s->height)
+    if (t.left >= t.right || t.top >= t.bottom || t.right <= 0 || t.bottom <= 0)
+        return;
+    if (t.left >= s->width || t.top >= s->height)
         return;
     Four corner[3];
     for (int i = 0; i < 3; i++)
@@ -199,18 +206,15 @@ INLINE void draw_face(const Raster *r, const int32_t given[3])
 }
 
 /* The picture (height / side, width / side, 4): radiance times coverage, and coverage. */
-EXPORT HOT void draw(const Raster *r, float *drawn)
+EXPORT HOT void draw(const Raster *r, Four *drawn)
 {
     const Samples *s = &r->samples;
     place_corners(r);
-    memset(s->nearness, 0, (size_t)(s->width * s->height) * sizeof *s->nearness);
+    memset(s->planes, 0, (size_t)(s->width * s->height) * sizeof *s->planes);
     for (const int32_t *face = r->faces; face < r->faces + 3 * r->face_count; face += 3) {
         const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
         if ((a->nearness > 0.0f) & (b->nearness > 0.0f) & (c->nearness > 0.0f))
             draw_face(r, face);
     }
-    if (r->side == 2)
-        mean_of_samples(s, 2, drawn);
-    else
-        mean_of_samples(s, r->side, drawn);
+    mean_of_samples(s, r->side, drawn);
 }

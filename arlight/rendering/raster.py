@@ -42,7 +42,7 @@ class _Shading(Workspace):
 class _Raster(Workspace):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("pixels", "depth_mm", "body", "mirrored", "faces", "texture_place")),
-        *((name, ctypes.c_void_p) for name in ("corners", "nearness", "radiance")),
+        *((name, ctypes.c_void_p) for name in ("corners", "planes")),
         *((name, ctypes.c_int64) for name in ("plane", "width", "height")),
         *((name, ctypes.c_int64) for name in ("vertex_count", "face_count", "closed", "samples")),
         *((name, ctypes.c_void_p) for name in ("levels", "linear")),
@@ -162,6 +162,6 @@ class RasterRenderer:
         """Room for samples and picture; it only grows."""
         if self._raster.plane < samples + _SIDE_BY_SIDE:
             self._raster.plane = plane = samples + _SIDE_BY_SIDE
-            self._raster.hold({"nearness": np.empty(plane, np.float32), "radiance": np.empty((3, plane), np.float32)})
+            self._raster.hold({"planes": np.empty((4, plane), np.float32)})
         if len(self._drawn) < values:
             self._drawn = np.empty(values, np.float32)

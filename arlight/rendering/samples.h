@@ -4,12 +4,13 @@
 
 #include "eight.h"
 
+#include <string.h>
+
 enum { SIDE_BY_SIDE = 8 };
 
 typedef struct {
-    float *nearness; /* (height * width + SIDE_BY_SIDE) 1 / depth of what is drawn, 0 where nothing is */
-    float *radiance; /* (3, plane) of it; means nothing where nothing is drawn */
-    int64_t plane;   /* height * width + SIDE_BY_SIDE at least: what is drawn may be written beyond the last sample */
+    float *planes; /* (4, plane) 1 / depth of what is drawn, 0 where nothing is; its red, green, blue, or anything */
+    int64_t plane; /* height * width + SIDE_BY_SIDE at least: samples are written in eights, also the last one */
     int64_t width, height;
 } Samples;
 
@@ -20,38 +21,72 @@ INLINE void put_where(EightBits seen, Eight value, float *there)
     *eight = (Eight)((seen & (EightBits)value) | (~seen & (EightBits)*eight));
 }
 
-/* Eight samples: where `outside` is not negative, no, is a bit pattern without sign, and the value is nearer than what
-   is there, it replaces it. `value` is radiance / depth, and 1 / depth. */
-INLINE void put(const Samples *s, int64_t at, EightBits outside, const Eight value[4])
+/* Eight samples of planes: the value, radiance / depth and 1 / depth, replaces what is there where it is nearer and
+   `outside` is not negative. */
+INLINE void put(float *samples, int64_t plane, EightBits outside, const Eight value[4])
 {
-    Eight before = *(const EightThere *)(s->nearness + at);
+    Eight before = *(const EightThere *)samples, depth = 1.0f / value[3];
     EightBits seen = (~outside & (EightBits)(before - value[3])) >> 31;
-    Eight depth = 1.0f / value[3];
-    put_where(seen, value[3], s->nearness + at);
+    put_where(seen, value[3], samples);
     for (int c = 0; c < 3; c++)
-        put_where(seen, value[c] * depth, s->radiance + c * s->plane + at);
+        put_where(seen, value[c] * depth, samples + (c + 1) * plane);
 }
 
-/* The mean of each pixel's `side` by `side` samples: radiance times coverage, and coverage, (rows, columns, 4). */
-INLINE void mean_of_samples(const Samples *s, int64_t side, float *restrict drawn)
+/* Sums of neighbours among sixteen samples in a row. */
+INLINE Eight pair_sums(Eight left, Eight right)
 {
-    int64_t columns = s->width / side;
-    const float *nearness = s->nearness, *red = s->radiance, *green = red + s->plane, *blue = green + s->plane;
-    float share = 1.0f / (float)(side * side);
-    for (int64_t row = 0; row < s->height / side; row++, drawn += 4 * columns)
-        for (int64_t column = 0; column < columns; column++) {
-            float r = 0.0f, g = 0.0f, b = 0.0f, covered = 0.0f;
-            for (int64_t i = 0; i < side; i++)
-                for (int64_t j = 0; j < side; j++) {
-                    int64_t at = (row * side + i) * s->width + column * side + j;
-                    float ar = red[at], ag = green[at], ab = blue[at];
-                    int drawn_there = nearness[at] > 0.0f;
-                    r += drawn_there ? ar : 0.0f, g += drawn_there ? ag : 0.0f, b += drawn_there ? ab : 0.0f;
-                    covered += drawn_there ? 1.0f : 0.0f;
-                }
-            float *pixel = drawn + 4 * column;
-            pixel[0] = r * share, pixel[1] = g * share, pixel[2] = b * share, pixel[3] = covered * share;
+    const EightBits even = {0, 2, 4, 6, 8, 10, 12, 14}, odd = {1, 3, 5, 7, 9, 11, 13, 15};
+    return __builtin_shuffle(left, right, even) + __builtin_shuffle(left, right, odd);
+}
+
+/* Eight pixels of two by two samples: the mean of radiance times coverage, and of coverage. */
+INLINE void mean_of_eight(const Samples *s, const float *samples, Four *drawn)
+{
+    Eight sum[4];
+    EightBits seen[2][2];
+    for (int row = 0; row < 2; row++)
+        for (int half = 0; half < 2; half++)
+            seen[row][half] = *(const EightThere *)(samples + row * s->width + half * SIDE_BY_SIDE) > 0.0f;
+    if (!any(seen[0][0] | seen[0][1] | seen[1][0] | seen[1][1])) {
+        memset(drawn, 0, SIDE_BY_SIDE * sizeof *drawn);
+        return;
+    }
+    for (int c = 0; c < 4; c++) {
+        Eight column[2];
+        for (int half = 0; half < 2; half++) {
+            const float *at = samples + c * s->plane + half * SIDE_BY_SIDE;
+            Eight above = all(1.0f), below = above;
+            if (c > 0)
+                above = *(const EightThere *)at, below = *(const EightThere *)(at + s->width);
+            column[half] = (Eight)((EightBits)above & seen[0][half]) + (Eight)((EightBits)below & seen[1][half]);
         }
+        sum[c] = pair_sums(column[0], column[1]) * 0.25f;
+    }
+    store_pixels(sum[1], sum[2], sum[3], sum[0], drawn, 1);
+}
+
+/* The same of a pixel of `side` by `side`. */
+INLINE Four mean_of_one(const Samples *s, const float *samples, int64_t side)
+{
+    Four sum = {0.0f, 0.0f, 0.0f, 0.0f};
+    for (int64_t row = 0; row < side; row++, samples += s->width)
+        for (const float *at = samples; at < samples + side; at++)
+            if (*at > 0.0f)
+                sum += (Four){at[s->plane], at[2 * s->plane], at[3 * s->plane], 1.0f};
+    return sum * (1.0f / (float)(side * side));
+}
+
+/* The picture (height / side, width / side, 4) of the samples. */
+INLINE void mean_of_samples(const Samples *s, int64_t side, Four *drawn)
+{
+    int64_t columns = s->width / side, together = side == 2 ? columns / SIDE_BY_SIDE * SIDE_BY_SIDE : 0;
+    for (int64_t row = 0; row < s->height / side; row++, drawn += columns) {
+        const float *samples = s->planes + row * side * s->width;
+        for (int64_t column = 0; column < together; column += SIDE_BY_SIDE)
+            mean_of_eight(s, samples + 2 * column, drawn + column);
+        for (int64_t column = together; column < columns; column++)
+            drawn[column] = mean_of_one(s, samples + side * column, side);
+    }
 }
 
 #endif

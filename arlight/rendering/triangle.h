@@ -1,18 +1,18 @@
-/* The samples that a triangle covers: those whose centres lie inside, and where two triangles share an edge every sample
-   on it belongs to one of them alone. Corners lie on a grid of 1 / SNAP of a sample, and sample (column, row) has its
-   centre at just these integers. Whichever way it is told, it is told exactly.
+/* The samples that a triangle covers: those whose centres lie inside, and where two triangles share an edge every
+   sample on it belongs to one of them alone. Corners lie on a grid of 1 / SNAP of a sample, and sample (column, row)
+   has its centre at just these integers. Both ways to tell are exact.
 
    A small triangle: by the sign of each edge, in whole numbers, for eight samples side by side.
 
-   Any other: row by row. Where an edge crosses a row is a fraction whose denominator is the edge's height in grid steps:
-   unless it is a whole number it is farther than EDGE from one while the edge is less than 4096 samples high, and the
-   rounding of as many steps is no more than EDGE. */
+   Any other: row by row. Where an edge crosses a row is a fraction whose denominator is the edge's height in grid
+   steps: unless it is a whole number it is farther than EDGE from one while the edge is less than 4096 samples high,
+   and the rounding of as many steps is no more than EDGE. */
 #ifndef ARLIGHT_TRIANGLE_H
 #define ARLIGHT_TRIANGLE_H
 
 #include "samples.h"
 
-enum { SNAP_BITS = 8, SNAP = 1 << SNAP_BITS, SMALL_HEIGHT = 64 };
+enum { SNAP_BITS = 8, SNAP = 1 << SNAP_BITS, SMALL = 24 };
 
 #define FARTHEST 0x1p23f       /* corners farther than this from the first sample, on the grid, are not drawn */
 #define ASIDE 0x1p17           /* farther aside than any row reaches */
@@ -25,8 +25,8 @@ typedef struct {
 } Triangle;
 
 typedef struct {
-    EightBits outside[3]; /* for each edge, of eight samples in a row: negative where they lie outside of it */
-    int32_t down[3];      /* its change to the next row */
+    int32_t first[3];           /* for each edge, at the box's first sample: negative outside of it */
+    int32_t across[3], down[3]; /* its change to the next column and row */
 } Edges;
 
 typedef struct {
@@ -62,13 +62,9 @@ INLINE void find_box(Triangle *t)
     t->top = sample_from(least(t->y)), t->bottom = sample_from(most(t->y));
 }
 
-/* Whether eight samples side by side hold each of its rows. */
-INLINE int is_small(const Triangle *t)
-{
-    return (t->right - t->left <= SIDE_BY_SIDE) & (t->bottom - t->top <= SMALL_HEIGHT);
-}
+/* Whether whole numbers tell of its edges, and most of its box is not wasted. */
+INLINE int is_small(const Triangle *t) { return (t->right - t->left <= SMALL) & (t->bottom - t->top <= SMALL); }
 
-/* The edges of a small triangle at the first row of its box. */
 INLINE Edges edges_of(const Triangle *t)
 {
     Edges edges;
@@ -77,9 +73,8 @@ INLINE Edges edges_of(const Triangle *t)
         int32_t across = t->x[j] - t->x[i], down = t->y[j] - t->y[i];
         /* of what lies on an edge, left edges and upper ones own it */
         int32_t other = down > 0 || (down == 0 && across < 0);
-        int32_t first = across * (SNAP * t->top - t->y[i]) - down * (SNAP * t->left - t->x[i]) - other;
-        edges.outside[i] = first - SNAP * down * COLUMN;
-        edges.down[i] = SNAP * across;
+        edges.first[i] = across * (SNAP * t->top - t->y[i]) - down * (SNAP * t->left - t->x[i]) - other;
+        edges.across[i] = -SNAP * down, edges.down[i] = SNAP * across;
     }
     return edges;
 }

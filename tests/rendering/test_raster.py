@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from arlight.camera import Pose
+from arlight.color import linear_from_encoded
 from arlight.rendering.default_object import default_object
 from arlight.rendering.draw import ObjectRenderer
 from arlight.rendering.gloss import GLOSS_SIDE, gloss_rows
@@ -191,6 +192,24 @@ def test_flat_and_far_reaching_triangles_cover_what_lies_between_their_edges(cam
         # single precision of the projection moves corners far outside by more than the grid
         tolerated = rim if np.abs(corners).max() < 256 * 512 else rim | _near_an_edge(corners, x, y, 0.2 * 256)
         assert np.array_equal(covered[~tolerated], inside[~tolerated])
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 50.0])
+def test_a_texture_lies_on_the_body_in_perspective(camera, looking_down, tilt_deg):
+    places = np.array([[-40.0, -40.0], [40.0, -40.0], [40.0, 40.0], [-40.0, 40.0]])
+    card, pose = flat_mesh(places, np.array([[0, 1, 2], [0, 2, 3]])), looking_down(tilt_deg, 250.0)
+    squares = np.random.default_rng(6).integers(30, 255, (2, 4, 4, 3)).astype(np.uint8)
+    textures = squares.repeat(16, axis=1).repeat(16, axis=2)
+    uv = ((places + 40.0) / 80.0).astype(np.float32)
+    mesh = replace(card, uv=uv, layer=np.ones(4, np.float32), textures=textures)
+    image = drawn(matte_renderer(mesh, 0.5, 2), mesh, camera, pose)
+    region = project(camera, pose, mesh.vertices_mm).region()
+    for row, column in np.ndindex(4, 4):
+        # the last row of a picture is where v is 0
+        middle = [20.0 * column - 30.0, 30.0 - 20.0 * row, 0.0]
+        x, y = np.rint(camera.project(pose, [middle])[0]).astype(int)
+        expected = 0.5 * linear_from_encoded(squares[1, row, column] / 255.0)
+        np.testing.assert_allclose(image[y - region.y0, x - region.x0], [*expected, 1.0], rtol=1e-4)
 
 
 def test_small_triangles_cover_what_lies_between_their_edges(camera, looking_down):
