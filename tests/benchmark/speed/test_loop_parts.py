@@ -2,6 +2,7 @@
 
 import pytest
 
+from arlight.benchmark.speed.budget_part import BUDGETS_MS, measure_budgets
 from arlight.benchmark.speed.coding_part import measure_coding
 from arlight.benchmark.speed.drawing_part import CONVERSION, OPENGL, measure_drawing
 from arlight.benchmark.speed.loop_part import measure_loop
@@ -28,6 +29,21 @@ def test_the_loop_is_run_as_often_as_the_transcode_on_the_same_frames(clip, reli
     ratio = found.ratios["loop, tiny"].value
     assert ratio.count == 2
     assert 1e3 / loop["wall_ms"]["median"] == pytest.approx(loop["frames_per_second"])
+
+
+def test_every_frame_under_a_deadline_is_made_or_left_out_and_some_are_judged(clip, relighter, tmp_path):
+    found = measure_budgets(clip, 1.5, relighter, relighter, tmp_path)
+    rows = found.details["budget"]
+    assert [row["budget_ms"] for row in rows] == list(BUDGETS_MS)
+    for row in rows:
+        assert sum(row["frames_at_rung"]) + row["left_out"] == row["frames"] >= 36
+        assert row["in_time"] == pytest.approx((sum(row["frames_at_rung"]) - row["late"]) / row["frames"])
+        assert found.errors[f"relit picture, {row['budget_ms']:g} ms a frame"] == row["relighting_error"]
+    # a deadline of a second is held, with nothing given up; the picture is then nearly the true one
+    leisure = measure_budgets(clip, 1.5, relighter, relighter, tmp_path, (1000.0,)).details["budget"][0]
+    assert leisure["late"] == leisure["left_out"] == 0
+    assert leisure["frames_at_rung"][0] == leisure["frames"]
+    assert leisure["relighting_error"] < 0.2
 
 
 def test_reading_and_writing_are_counted_by_the_frame(clip, tmp_path):
