@@ -17,7 +17,7 @@ _NEAR_SHARE = 0.02
 """Near plane, as a share of the camera's distance from the sheet's origin."""
 _LENS_REACH = 1.3
 """Undistorted image radii, relative to the frame's corner, beyond which a lens model is not trusted."""
-_project = library(__file__, "projection").project_points
+_project = library(__file__, "projection", keeps_lock=True).project_points
 _project.restype = ctypes.c_int64
 _project.argtypes = [ctypes.c_void_p, ctypes.c_int64, *[ctypes.c_void_p] * 4]
 
