@@ -15,6 +15,7 @@
 #define PRIOR_VARIANCE_PX2 1.0
 #define PRIOR_SHIFT_PX 0.3          /* how far encoders' chroma is from where their tags put it */
 #define STRONGEST_CYCLES 0.2        /* stripes finer than this say nothing about it either [1/px] */
+#define FEW_CELLS 16                /* beside a quarter of the pixels' number: more cells say nothing more */
 #define LEAST_KEPT 0.3              /* what averaging a cell's pixels must leave of stripes for them to be compared */
 
 /* One block's chroma, complex numbers as cosine and minus sine part. */
@@ -48,7 +49,8 @@ static HOT float sum_list(int total, const float *restrict values, float *least)
 /* Sums over the cells of one block: values Cb, Cr and the mean of their luma, as far as chroma is scaled with it. */
 static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
-    int total = list_points(b, block, grid, (int)b->limit / 2, CELLS);
+    int quarter = (int)b->limit / 4, limit = quarter + (quarter < FEW_CELLS ? quarter : FEW_CELLS);
+    int total = list_points(b, block, grid, limit, CELLS);
     float *c = list_of(b, PHASE_LIST), *s = list_of(b, SINE_LIST), *values = list_of(b, CODE_LIST);
     float *luma = list_of(b, LIGHT_LIST);
     turn_all(total, c, s);
@@ -175,7 +177,7 @@ static double correct(const Stream *stream, const Chroma *a, double correction[2
  * colour differences scale with the light of the stripes. */
 static void mix_tints(const Blocks *b, int block, const Chroma *a, double correction[2][3])
 {
-    double darkest = fmax(fmin(a->darkest, a->luma[0] - hypot(a->luma[1], a->luma[2])), 0.0);
+    double darkest = fmax(fmin(a->darkest, a->luma[0] - sqrt(a->luma[1] * a->luma[1] + a->luma[2] * a->luma[2])), 0.0);
     double over = 1.0 / fmax(a->mean[0] - darkest + DARKEST, DARKEST), base = (DARKEST - darkest) * over;
     const float *hue = b->hue + (int64_t)block * HUES * HUE;
     for (int c = 0; c < CHANNELS; c++) {

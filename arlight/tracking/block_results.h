@@ -53,7 +53,8 @@ static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *ord
                 values[i * CHANNELS + c] = fits->solved[c][i][l];
             double left = squares[l][c] - fits->explained[c][l];
             b->variance[block * CHANNELS + c] = fmax(left, 0.0) / (used[l] - fits->columns);
-            b->shading[block * CHANNELS + c] = hypot(fits->solved[c][kept][l], fits->solved[c][kept + 1][l]);
+            double slope_x = fits->solved[c][kept][l], slope_y = fits->solved[c][kept + 1][l];
+            b->shading[block * CHANNELS + c] = sqrt(slope_x * slope_x + slope_y * slope_y);
         }
         for (int i = 0; i < kept; i++)
             for (int j = 0; j <= i; j++)
