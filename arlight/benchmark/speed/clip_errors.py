@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from arlight.benchmark.evaluation import order_error
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
-from arlight.fourier import frequency_order
+from arlight.estimation.order_choice import Need
+from arlight.fourier import frequency_order, pack_real
 from arlight.probe.design import Probe
 from arlight.rendering.relight import Relighter
 from arlight.synthetic.truth import FrameTruth
@@ -101,6 +102,30 @@ def light_error(relighter: Relighter, lighting: Lighting, true: Lighting, pose: 
         return float("nan")
     inside = reference[1][..., 3] > _INSIDE
     return relative_rms(shown[1][inside][:, :3], reference[1][inside][:, :3])
+
+
+def need_error(need: Need, lighting: Lighting, truth: FrameTruth) -> float:
+    """Error that comes from the light alone, of an object's picture and its shadow, averaged over views from above.
+
+    Args:
+        need: what of the light the object shows, for the order of the sheet.
+        lighting: the estimate, of that order or less: as in drawing, what it leaves out is what it makes most probable.
+        truth: the true light, to the order of the sheet.
+
+    Returns:
+        rms of the difference of linear light, relative to the rms of the true picture.
+    """
+    true, shown = (_parts(need, each) for each in (truth.coefficients, lighting.coefficients))
+    difference = -true
+    difference[: len(shown)] += shown
+    error, power = (float(np.sum(parts * (need.shown @ parts))) for parts in (difference, true))
+    return float(np.sqrt(error / power)) if power > 0.0 else float("nan")
+
+
+def _parts(need: Need, coefficients: NDArray[np.complex128]) -> Array:
+    """(m, 3) independent parts of the light; the first of these follow from the first coefficients."""
+    packed = pack_real(coefficients)
+    return np.asarray(np.linalg.solve(need.independent[: len(packed), : len(packed)], packed))
 
 
 def relative_rms(shown: NDArray[np.float32], reference: NDArray[np.float32]) -> float:

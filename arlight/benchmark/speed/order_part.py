@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from arlight.benchmark.speed.clip_errors import light_error, rms, true_lighting
+from arlight.benchmark.speed.clip_errors import need_error, rms
 from arlight.benchmark.speed.contest import Contender, contend, contender
 from arlight.benchmark.speed.estimation_pass import Clock, run_estimation
 from arlight.benchmark.speed.findings import Findings, Ratio
@@ -13,9 +13,9 @@ from arlight.benchmark.speed.relighters import Relighters
 from arlight.benchmark.speed.spread import block_means, paired_ratio
 from arlight.camera import Camera
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.order_choice import Need
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.design import Probe
-from arlight.rendering.relight import Relighter
 from arlight.rendering.settings import RelightSettings
 from arlight.synthetic.truth import FrameTruth
 
@@ -28,7 +28,6 @@ LEAST_FRAMES = 24
 """Frames over which costs are averaged: a look at all orders, once a second, counts in every one of them."""
 _SETTLING = 40
 """Frames until a lower order has been taken where one suffices."""
-_JUDGED_EVERY = 5
 
 
 def measure_order(clip: FilmedClip, frames: int, relighters: Relighters) -> Findings:
@@ -48,8 +47,8 @@ def measure_order(clip: FilmedClip, frames: int, relighters: Relighters) -> Find
         relighter = relighters.of(clip.probe, clip.camera, settings)
         everything, auto = (contender(clip, TrackerSettings(order=order), relighter) for order in ("all", "auto"))
         truth = contend(clip, _SETTLING + frames, [everything, auto]).truth
-        by_order = [_picture_error(relighter, lights, truth, clip.probe) for lights in fixed]
-        own = _picture_error(relighter, [estimate.lighting for estimate in auto.estimates], truth, clip.probe)
+        by_order = [_picture_error(relighter.need, lights, truth) for lights in fixed]
+        own = _picture_error(relighter.need, [estimate.lighting for estimate in auto.estimates], truth)
         name = f"{look}, {clip.workload.name}"
         found.errors[f"auto over the best order, {name}"] = own / min(by_order)
         found.ratios[f"auto over all orders, {name}"] = cost = _cost(auto, everything)
@@ -74,16 +73,11 @@ def _fixed_order(clip: FilmedClip, order: int, frames: int) -> list[Lighting | N
     return run_estimation(clip, frames, tracker).filtered
 
 
-def _picture_error(
-    relighter: Relighter, lights: Sequence[Lighting | None], truth: Sequence[FrameTruth], probe: Probe
-) -> float:
-    """rms over some of the settled frames; inf where there is no light."""
-    errors = []
-    for light, true in list(zip(lights, truth, strict=True))[_SETTLING::_JUDGED_EVERY]:
-        if light is None:
-            return float("inf")
-        errors.append(light_error(relighter, light, true_lighting(light, true, probe), true.pose))
-    return rms(np.array(errors))
+def _picture_error(need: Need, lights: Sequence[Lighting | None], truth: Sequence[FrameTruth]) -> float:
+    """rms over the settled frames; inf where there is no light."""
+    settled = list(zip(lights, truth, strict=True))[_SETTLING:]
+    errors = [float("inf") if light is None else need_error(need, light, true) for light, true in settled]
+    return float("inf") if np.isinf(errors).any() else rms(np.array(errors))
 
 
 def _cost(auto: Contender, everything: Contender) -> Ratio:

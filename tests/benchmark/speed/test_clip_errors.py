@@ -8,6 +8,7 @@ import pytest
 from arlight.benchmark.speed.clip_errors import (
     coefficient_errors,
     light_error,
+    need_error,
     pose_errors_px,
     relative_rms,
     rms,
@@ -16,6 +17,8 @@ from arlight.benchmark.speed.clip_errors import (
 from arlight.benchmark.speed.relighters import Relighters
 from arlight.camera import Pose
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.order_choice import Need
+from arlight.fourier import pack_real
 from arlight.rendering.settings import RelightSettings
 
 
@@ -80,6 +83,20 @@ def test_the_object_shows_how_much_too_bright_the_light_is(clip, true_light):
         assert np.isnan(light_error(relighter, true_light, true, behind))
     finally:
         relighters.release()
+
+
+def test_the_object_s_need_shows_how_wrong_the_light_is(clip, true_light):
+    count = 2 * len(clip.probe.frequencies) - 1
+    triangle = np.tril(np.random.default_rng(3).uniform(0.5, 1.0, (count, count)))
+    need = Need(triangle, np.eye(count), 0.04)
+    true = clip.truth[0]
+    light = replace(true_light, coefficients=true.coefficients)
+    assert need_error(need, light, true) == 0.0
+    assert need_error(need, light.scaled(np.full(3, 1.2)), true) == pytest.approx(0.2)
+    # parts that are left out are missing, the others are right
+    parts = np.linalg.inv(triangle) @ pack_real(true.coefficients)
+    missing = np.sum(parts[1:] ** 2) / np.sum(parts**2)
+    assert need_error(need, light.truncated(0), true) == pytest.approx(np.sqrt(missing))
 
 
 def test_relative_rms_of_nothing_is_not_told():
