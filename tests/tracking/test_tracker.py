@@ -230,6 +230,17 @@ def test_prediction_continues_a_uniform_motion(look) -> None:
     np.testing.assert_allclose(half.rotation, poses[3].rotation, atol=1e-12)
 
 
+@pytest.mark.parametrize("angle", [1e-9, 1e-3, 1.0, 3.1])
+def test_prediction_turns_by_a_share_of_any_angle(look, angle) -> None:
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    before = look(30, 10, 300)
+    last, ahead = (
+        Pose(Pose.from_rvec(share * angle * axis, np.zeros(3)).rotation @ before.rotation, before.translation)
+        for share in (1.0, 1.5)
+    )
+    np.testing.assert_allclose(predict(before, 1.0, last, 1.2, 1.3).rotation, ahead.rotation, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("before_s", "last_s", "time_s"), [(1.0, 1.0, 2.0), (1.0, 2.0, 2.0), (1.0, 2.0, 0.5), (3.0, 2.0, 4.0)]
 )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arlight.calibration.camera.exposure import ExposureMeter
+from arlight.calibration.camera.exposure import ExposureMeter, PaperLevel
 from arlight.calibration.camera.paper_samples import PaperSampler, read_encoded
 from arlight.camera import Camera
 from arlight.color import encoded_from_linear, linear_from_encoded
@@ -227,3 +227,12 @@ def test_grey_footage_is_read_too():
 def test_a_camera_of_another_kind_measures_the_same_sheet(small_sheet):
     wide = Camera((64, 48), np.array([[30.0, 0, 32], [0, 30.0, 24], [0, 0, 1]]), np.zeros(5))
     assert len(PaperSampler(small_sheet, wide).paper_mm) > 200
+
+
+def test_a_level_is_known_within_a_share_of_itself():
+    level = np.array([0.5, 0.2, 0.1])
+    paper = PaperLevel(level, (0.01 * level) ** 2, 1.0)
+    assert paper.is_known_within(0.011)
+    assert not paper.is_known_within(0.009)
+    for unknown in (PaperLevel(level, np.array([0.0, np.inf, 0.0]), 1.0), PaperLevel(level * np.nan, 0.0 * level, 0.0)):
+        assert not unknown.is_known_within(1.0)
