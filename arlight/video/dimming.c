@@ -17,7 +17,7 @@
 #define NODE 4
 
 /* Lines of pixels. */
-enum { FACTORS = 3, OFFSETS = 3, LINES = FACTORS + OFFSETS + 1 };
+enum { FACTORS = 3, OFFSETS = 3, SUMS = 2, LINES = FACTORS + OFFSETS + SUMS };
 /* Numbers of scratch memory to a column of nodes: k at two rows of them and between, and the lines of pixels. */
 EXPORT const int32_t dimming_scratch = 9 + LINES * NODE;
 
@@ -39,19 +39,21 @@ struct band {
     const struct dimming *d;
     float *factor[3];       /* (pixels) k of each colour */
     float *offset[3];       /* (pixels) what chroma adds to luma in each colour */
-    float *luma;            /* (pixels) sum over the band's rows */
+    float *sum[2];          /* (pixels) Cb and Cr, summed over the band's rows */
 };
 
-/* k of a colour at a row of nodes. */
+/* k of a colour at a row of nodes, to a fortieth of an 8-bit code. */
 static HOT void encode_shares(const struct layout *layout, const struct dimming *d, const float *restrict left,
                               float *restrict factor)
 {
-    float b = d->lowered, scale = 1.0f / (1.0f + b);
+    const float *restrict curve = layout->encode.values;
+    float b = d->lowered, scale = 1.0f / (1.0f + b), last = layout->encode.last;
+#pragma GCC ivdep
     for (int32_t i = 0; i < d->columns; i++) {
         /* what is no number takes nothing away */
         float share = left[i] < 1.0f ? left[i] : 1.0f;
-        float some = (through(layout->encode, sqrtf(share > 0.0f ? share : 0.0f)) + b) * scale;
-        factor[i] = share < 1.0f ? some : 1.0f;
+        int32_t at = (int32_t)(sqrtf(share > 0.0f ? share : 0.0f) * last + 0.5f);
+        factor[i] = share < 1.0f ? (curve[at] + b) * scale : 1.0f;
     }
 }
 
@@ -69,7 +71,8 @@ static HOT struct run dimmed_nodes(const struct dimming *d, const float *restric
     int32_t n = d->columns;
     struct run run = {0, n};
     for (int32_t i = 0; i < n; i++) {
-        float a = above[i] < below[i] ? above[i] : below[i], b = above[n + i] < below[n + i] ? above[n + i] : below[n + i];
+        float a = above[i] < below[i] ? above[i] : below[i];
+        float b = above[n + i] < below[n + i] ? above[n + i] : below[n + i];
         float c = above[2 * n + i] < below[2 * n + i] ? above[2 * n + i] : below[2 * n + i];
         a = a < b ? a : b;
         least[i] = a < c ? a : c;
@@ -146,7 +149,7 @@ INLINE float dimmed(float encoded, float k, struct power c)
     return bright >= c.limit ? bright - c.lowered : dark;
 }
 
-/* A row of luma, or of red where planes are red, green and blue. */
+/* A row of luma, or of red where planes are red, green and blue; what its pixels make of the other two is added up. */
 INLINE void dim_codes(const struct band *band, void *restrict row, int wide, int32_t first, int32_t count)
 {
     const struct layout *l = band->layout;
@@ -154,15 +157,18 @@ INLINE void dim_codes(const struct band *band, void *restrict row, int wide, int
     const float *restrict kr = band->factor[0] + first, *restrict kg = band->factor[1] + first;
     const float *restrict kb = band->factor[2] + first, *restrict red = band->offset[0] + first;
     const float *restrict green = band->offset[1] + first, *restrict blue = band->offset[2] + first;
-    float *restrict sum = band->luma + first;
+    float *restrict cb = band->sum[0] + first, *restrict cr = band->sum[1] + first;
     struct power c = power_of(band->d);
-    float zero = l->black, span = l->luma_span, top = l->top;
-    float scale = 1.0f / span, m0 = m[0], m3 = m[3], m6 = m[6], w0 = w[0], w1 = w[1], w2 = w[2];
+    float zero = l->black, span = l->luma_span, top = l->top, scale = 1.0f / span, m0 = m[0], m3 = m[3], m6 = m[6];
+    float w0 = w[0], w1 = w[1], w2 = w[2], w3 = w[3], w4 = w[4], w5 = w[5], w6 = w[6], w7 = w[7], w8 = w[8];
+#pragma GCC ivdep
     for (int32_t i = 0; i < count; i++) {
         float code = wide ? ((uint16_t *)row)[i] : ((uint8_t *)row)[i], y = (code - zero) * scale;
         float r = dimmed(m0 * y + red[i], kr[i], c), g = dimmed(m3 * y + green[i], kg[i], c);
-        int32_t found = nearest_code(w0 * r + w1 * g + w2 * dimmed(m6 * y + blue[i], kb[i], c), zero, span, top);
-        sum[i] += y;
+        float b = dimmed(m6 * y + blue[i], kb[i], c);
+        int32_t found = nearest_code(w0 * r + w1 * g + w2 * b, zero, span, top);
+        cb[i] += w3 * r + w4 * g + w5 * b;
+        cr[i] += w6 * r + w7 * g + w8 * b;
         if (wide)
             ((uint16_t *)row)[i] = (uint16_t)found;
         else
@@ -179,26 +185,13 @@ static HOT void dim_row(const struct band *band, uint8_t *row, int32_t column, s
         dim_codes(band, row + column, 0, pixels.first, count);
 }
 
-/* A row of one kind of chroma, from luma averaged over the pixels that share it. */
-INLINE void dim_chroma_codes(const struct band *band, void *restrict row, int wide, int across, const float *w, float share,
-                             int32_t first, int32_t samples)
+/* A row of chroma from its pixels' sum, `share` of it. */
+INLINE void write_codes(const struct layout *l, const float *restrict sum, void *restrict row, int wide, int across,
+                        float share, int32_t samples)
 {
-    const struct layout *l = band->layout;
-    const float *m = l->rgb_from_ycc;
-    const float *restrict kr = band->factor[0] + first, *restrict kg = band->factor[1] + first;
-    const float *restrict kb = band->factor[2] + first, *restrict red = band->offset[0] + first;
-    const float *restrict green = band->offset[1] + first, *restrict blue = band->offset[2] + first;
-    const float *restrict luma = band->luma + first;
-    struct power c = power_of(band->d);
-    float zero = l->neutral, span = l->chroma_span, top = l->top;
-    float m0 = m[0], m3 = m[3], m6 = m[6], w0 = w[0], w1 = w[1], w2 = w[2];
     for (int32_t i = 0; i < samples; i++) {
-        int32_t at = across * i, next = at + across - 1;
-        float y = share * (across == 2 ? luma[at] + luma[next] : luma[at]);
-        float r = dimmed(m0 * y + red[at], 0.5f * (kr[at] + kr[next]), c);
-        float g = dimmed(m3 * y + green[at], 0.5f * (kg[at] + kg[next]), c);
-        float value = w0 * r + w1 * g + w2 * dimmed(m6 * y + blue[at], 0.5f * (kb[at] + kb[next]), c);
-        int32_t found = nearest_code(value, zero, span, top);
+        float value = across == 2 ? sum[2 * i] + sum[2 * i + 1] : sum[i];
+        int32_t found = nearest_code(share * value, l->neutral, l->chroma_span, l->top);
         if (wide)
             ((uint16_t *)row)[i] = (uint16_t)found;
         else
@@ -206,15 +199,17 @@ INLINE void dim_chroma_codes(const struct band *band, void *restrict row, int wi
     }
 }
 
-static HOT void dim_chroma(const struct band *band, uint8_t *row, int32_t sample, const float *w, float share,
-                           int32_t first, int32_t samples)
+static HOT void write_chroma(const struct band *band, int which, uint8_t *row, int32_t sample, float share,
+                             int32_t first, int32_t samples)
 {
-    if (band->layout->wide)
-        dim_chroma_codes(band, (uint16_t *)row + sample, 1, band->d->across, w, share, first, samples);
+    const struct layout *l = band->layout;
+    const float *sum = band->sum[which] + first;
+    if (l->wide)
+        write_codes(l, sum, (uint16_t *)row + sample, 1, band->d->across, share, samples);
     else if (band->d->across == 2)
-        dim_chroma_codes(band, row + sample, 0, 2, w, share, first, samples);
+        write_codes(l, sum, row + sample, 0, 2, share, samples);
     else
-        dim_chroma_codes(band, row + sample, 0, 1, w, share, first, samples);
+        write_codes(l, sum, row + sample, 0, 1, share, samples);
 }
 
 /* The rows from y on that share a row of chroma samples, `pixels` of the region. */
@@ -227,7 +222,8 @@ static void dim_band(struct band *band, const struct picture *to, int32_t y, str
     int32_t samples = (width + d->across - 1) / d->across;
     uint8_t *cb = row_of(to, 1, r), *cr = row_of(to, 2, r);
     read_chroma(band, cb, cr, sample, pixels.first, samples);
-    memset(band->luma + pixels.first, 0, (size_t)width * sizeof(float));
+    for (int k = 0; k < 2; k++)
+        memset(band->sum[k] + pixels.first, 0, (size_t)width * sizeof(float));
     for (int32_t i = 0; i < rows; i++) {
         float share = (float)((y + i - d->box.y0) % NODE) / NODE;
         for (int k = 0; k < 3; k++) {
@@ -236,13 +232,11 @@ static void dim_band(struct band *band, const struct picture *to, int32_t y, str
         }
         dim_row(band, row_of(to, 0, y + i), column, pixels);
     }
-    /* the last sample of a row may have no second pixel */
-    for (int k = 0; k < 3; k++)
-        band->factor[k][pixels.end] = band->factor[k][pixels.end - 1];
-    band->luma[pixels.end] = band->luma[pixels.end - 1];
-    float share = 1.0f / (float)(rows * d->across);
-    dim_chroma(band, cb, sample, band->layout->ycc_from_rgb + 3, share, pixels.first, samples);
-    dim_chroma(band, cr, sample, band->layout->ycc_from_rgb + 6, share, pixels.first, samples);
+    for (int k = 0; k < 2; k++) {
+        /* the last sample of a row may have no second pixel */
+        band->sum[k][pixels.end] = band->sum[k][pixels.end - 1];
+        write_chroma(band, k, k == 0 ? cb : cr, sample, 1.0f / (float)(rows * d->across), pixels.first, samples);
+    }
 }
 
 /* Dims a picture in place. */
@@ -251,10 +245,12 @@ EXPORT void dim_picture(const struct layout *layout, const struct picture *to, c
     int32_t width = d->box.x1 - d->box.x0, line = NODE * d->columns;
     float *above = d->scratch, *below = above + 3 * d->columns, *between = below + 3 * d->columns;
     float *lines = between + 3 * d->columns;
-    struct band band = {.layout = layout, .d = d, .luma = lines + (FACTORS + OFFSETS) * line};
+    struct band band = {.layout = layout, .d = d};
     struct run nodes = {0, 0};
     for (int k = 0; k < 3; k++)
         band.factor[k] = lines + k * line, band.offset[k] = lines + (FACTORS + k) * line;
+    for (int k = 0; k < 2; k++)
+        band.sum[k] = lines + (FACTORS + OFFSETS + k) * line;
     encode_node_row(layout, d, 0, below);
     for (int32_t y = d->box.y0; y < d->box.y1; y += d->down) {
         if ((y - d->box.y0) % NODE == 0) {
