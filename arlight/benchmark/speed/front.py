@@ -19,7 +19,8 @@ from arlight.lighting_tracker import FrameEstimate
 from arlight.synthetic.truth import FrameTruth
 from arlight.video.frame import Frame, Region
 
-_JUDGED_EVERY = 6
+_JUDGED_EVERY = 5
+"""Frames; no divisor of a cycle, so that each of its parts is judged."""
 _BLOCK = 8
 """Frames over which costs are averaged before their median is taken: the light may be measured in every eighth only."""
 _CHANGED = 1e-6
@@ -45,7 +46,7 @@ class FrontPoint:
     relight_ms: float
     """Its part for drawing and compositing, median [ms]."""
     relighting_error: float
-    """Error of what is seen, relative; see `picture_error`; rms over the clips."""
+    """Error of what is seen, relative; see `picture_error`; geometric mean over the clips: each counts alike."""
     coefficient_error: float
     """Error of the light's coefficients of orders 1 and up, relative to |L~_0|; rms over the clips."""
     error_by_order: tuple[float, ...]
@@ -61,17 +62,14 @@ def measure_front(
 
     Args:
         settings: what is measured.
-        clips: one size and sheet throughout; costs are those on the first.
-        frames: how many of the first clip, 8 at least; a third of that of the others.
+        clips: one size and sheet throughout.
+        frames: how many of each clip, 8 at least.
         relighters: makes the drawers.
 
     Raises:
         RenderingUnavailableError: there is no headless OpenGL.
     """
-    rows = [
-        _measure_clip(settings, clip, max(_BLOCK, frames // 3) if number else frames, relighters)
-        for number, clip in enumerate(clips)
-    ]
+    rows = [_measure_clip(settings, clip, frames, relighters) for clip in clips]
     points = [_point(setting, [row[number] for row in rows]) for number, setting in enumerate(settings)]
     best = pareto(np.array([[point.cost_ms.median, point.relighting_error] for point in points]))
     found = Findings(details={"front": []})
@@ -113,36 +111,44 @@ def _measure_clip(
     rows = []
     for each, errors in zip(contenders, judge.errors, strict=True):
         light = coefficient_errors([estimate.lighting for estimate in each.estimates], contest.truth, clip.probe)
-        rows.append(_Row(each, contest.yardstick_s, float(np.median(errors)), light.together, light.orders))
+        rows.append(_Row(each, contest.yardstick_s, rms(np.array(errors)), light.together, light.orders))
     return rows
 
 
 def _point(setting: FrontSetting, rows: Sequence[_Row]) -> FrontPoint:
-    first = rows[0].contender
-    frame_s, estimate_s, relight_s, aruco_s = (
-        block_means(seconds, _BLOCK) for seconds in (first.frame_s, first.estimate_s, first.relight_s, rows[0].aruco_s)
+    contenders = [row.contender for row in rows]
+    frame_s, estimate_s, relight_s = (
+        [mean for each in contenders for mean in block_means(getattr(each, name), _BLOCK)]
+        for name in ("frame_s", "estimate_s", "relight_s")
     )
+    aruco_s = [mean for row in rows for mean in block_means(row.aruco_s, _BLOCK)]
     return FrontPoint(
         name=setting.name,
         is_preset=setting.is_preset,
         cost_ms=spread(frame_s).scaled(1e3),
-        stages_ms=_stages_ms(first),
+        stages_ms=_stages_ms(contenders),
         estimate_over_aruco=paired_ratio(estimate_s, aruco_s),
         estimate_ms=1e3 * spread(estimate_s).median,
         relight_ms=1e3 * spread(relight_s).median,
-        relighting_error=rms(np.array([row.picture_error for row in rows])),
+        relighting_error=_geometric_mean([row.picture_error for row in rows]),
         coefficient_error=rms(np.array([row.coefficients for row in rows])),
         error_by_order=rows[0].by_order,
     )
 
 
-def _stages_ms(contender: Contender) -> dict[str, float]:
+def _geometric_mean(errors: Sequence[float]) -> float:
+    """Of positive errors; inf where one is not finite."""
+    return float(np.exp(np.mean(np.log(errors)))) if np.all(np.isfinite(errors)) else float("inf")
+
+
+def _stages_ms(contenders: Sequence[Contender]) -> dict[str, float]:
     """Median wall time of every stage [ms]."""
     stages: dict[str, list[float]] = {}
-    for estimate in contender.estimates:
-        for stage, seconds in estimate.timings_s.items():
-            stages.setdefault(stage, []).append(seconds)
-    stages["relight"] = contender.relight_s
+    for each in contenders:
+        for estimate in each.estimates:
+            for stage, seconds in estimate.timings_s.items():
+                stages.setdefault(stage, []).append(seconds)
+        stages.setdefault("relight", []).extend(each.relight_s)
     return {stage: 1e3 * spread(block_means(seconds, _BLOCK)).median for stage, seconds in stages.items()}
 
 

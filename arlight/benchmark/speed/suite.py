@@ -7,6 +7,7 @@ from pathlib import Path
 
 from arlight.benchmark.speed import growth_part
 from arlight.benchmark.speed.bound_part import measure_bound
+from arlight.benchmark.speed.budget_part import measure_budgets
 from arlight.benchmark.speed.coding_part import measure_coding
 from arlight.benchmark.speed.drawing_part import measure_drawing
 from arlight.benchmark.speed.filming import film
@@ -17,7 +18,7 @@ from arlight.benchmark.speed.loop_part import measure_loop
 from arlight.benchmark.speed.memory_part import measure_memory
 from arlight.benchmark.speed.order_part import measure_order
 from arlight.benchmark.speed.playback import FilmedClip, load_clip
-from arlight.benchmark.speed.relighters import Relighters
+from arlight.benchmark.speed.relighters import FINEST, Relighters
 from arlight.benchmark.speed.start_part import measure_start
 from arlight.benchmark.speed.tracking_part import measure_tracking
 from arlight.benchmark.speed.workloads import APRIL_TAGS, FULL, HEADLINE, LARGE, QUICK, Workload
@@ -28,11 +29,12 @@ from arlight.presets import PRESETS
 _FRONT_CLIPS = (
     HEADLINE,
     "720p order 5, turning light",
+    "720p order 5, switched light",
     "720p order 5, apartment",
     "720p order 5, bridge",
     "720p order 5, studio",
 )
-_SHORT_S = 10.0
+_SHORT_S, _DEADLINE_S = 10.0, 40.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +118,7 @@ class Suite:
         parts += [Part("first result", self._start), Part("bound", self._bound), Part("front", self._front)]
         if not self.quick:
             parts += [Part(f"order, {name}", partial(self._order, name)) for name in names if name != LARGE]
+            parts.append(Part("deadlines", self._budgets))
             parts.append(Part("AprilTags", self._april_tags))
             parts += [Part(f"growth with {axis}", partial(grow, self)) for axis, grow in _GROWTH.items()]
             parts.append(Part("memory", self._memory))
@@ -158,7 +161,14 @@ class Suite:
 
     def _front(self) -> Findings:
         clips = [self.clip(name) for name in (_FRONT_CLIPS[:1] if self.quick else _FRONT_CLIPS)]
-        return measure_front(front_settings(self.quick), clips, self._count(24, 48), self.relighters)
+        return measure_front(front_settings(self.quick), clips, self._count(24, 72), self.relighters)
+
+    def _budgets(self) -> Findings:
+        clip = self.clip(HEADLINE)
+        relighter, finest = (
+            self.relighters.of(clip.probe, clip.camera, settings) for settings in (PRESETS["balanced"].relight, FINEST)
+        )
+        return measure_budgets(clip, _DEADLINE_S, relighter, finest, self.scratch)
 
     def _order(self, name: str) -> Findings:
         return measure_order(self.clip(name), 72, self.relighters)

@@ -25,6 +25,8 @@ def benchmark_tables(found: Findings) -> list[Table]:
     if found.details.get("workloads"):
         tables.append(_workload_table(found))
     tables.append(_stage_table(found))
+    if found.details.get("budget"):
+        tables.append(_budget_table(found))
     if found.details.get("order"):
         tables.append(_order_table(found))
     if found.details.get("front"):
@@ -93,6 +95,22 @@ def _stage_table(found: Findings) -> Table:
         value = ratio.value
         table.add_row(
             name, f"{value.median:.3f}", f"{value.low:.3f}-{value.high:.3f}", ratio.over, f"{ratio.cost_ms:.2f}"
+        )
+    return table
+
+
+def _budget_table(found: Findings) -> Table:
+    table = Table(title="deadlines: from decoded to composed")
+    for name in ("ms a frame", "in time %", "late", "left out", "frames at each rung", "relit picture %"):
+        table.add_column(name, justify="right")
+    for entry in found.details["budget"]:
+        table.add_row(
+            f"{entry['budget_ms']:g}",
+            f"{100.0 * entry['in_time']:.1f}",
+            str(entry["late"]),
+            str(entry["left_out"]),
+            " ".join(str(count) for count in entry["frames_at_rung"]),
+            _percent(entry["relighting_error"]),
         )
     return table
 

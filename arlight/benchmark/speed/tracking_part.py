@@ -99,7 +99,7 @@ def _workload_facts(clip: FilmedClip) -> dict[str, Any]:
         "order": scene.order,
         "size": list(scene.size),
         "camera": scene.path,
-        "light": "turning" if scene.turning else "still",
+        "light": scene.script,
         "environment": scene.environment,
         "sheet_width_px": scene.sheet_width_px,
         "blur_px": sensor.blur_px,

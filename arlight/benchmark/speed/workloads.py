@@ -6,7 +6,7 @@ from fractions import Fraction
 from arlight.benchmark.speed.skies import sky
 from arlight.probe.design import Probe
 from arlight.probe.layout import design_probe
-from arlight.synthetic.light_script import LightScript, exposure_for
+from arlight.synthetic.light_script import LightScript, ScriptName, exposure_for
 from arlight.synthetic.motion import CameraMotion, PathName
 from arlight.synthetic.sensor import Sensor
 
@@ -21,6 +21,7 @@ _KEY_DEG = 12.0
 _WHITE = 0.6
 _PATH_S = 5.0
 _FILMED_FROM_S = 1.0
+_SWITCHED_ON, _SWITCHED_S = "studio", 1.23
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +34,8 @@ class Scene:
     """Width and height of the picture [px]."""
     path: PathName = "orbit"
     """How the camera moves."""
-    turning: bool = False
-    """Whether the light turns about the zenith."""
+    script: ScriptName = "still"
+    """What the light does: it stays, turns about the zenith, or another one goes on at `_SWITCHED_S`."""
     environment: str = "hall"
     """Light, as `sky` names it."""
     sheet_width_px: float = 650.0
@@ -53,8 +54,10 @@ class Scene:
         """The light over time, exposed."""
         captured = LightScript(
             sky(self.environment),
-            "turn" if self.turning else "still",
+            self.script,
             turn_deg_per_s=_TURN_DEG_PER_S,
+            second=sky(_SWITCHED_ON) if self.script == "switch" else None,
+            change_s=_SWITCHED_S,
             key_deg=_KEY_DEG,
         )
         return captured.scaled(exposure_for(captured, self.probe.paper_reflectance, _WHITE))
@@ -67,7 +70,7 @@ class Scene:
     @property
     def still(self) -> bool:
         """Whether all its pictures are one."""
-        return self.path == "still" and not self.turning
+        return self.path == "still" and self.script == "still"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +114,13 @@ FULL = (
     *QUICK,
     *(Workload(f"720p order {order}", Scene(order=order)) for order in (1, 2, 3, 4)),
     Workload("720p order 5, still camera", Scene(path="still")),
-    Workload("720p order 5, turning light", Scene(turning=True)),
-    Workload("720p order 5, still camera, turning light", Scene(path="still", turning=True)),
+    Workload("720p order 5, turning light", Scene(script="turn")),
+    Workload("720p order 5, switched light", Scene(script="switch")),
+    Workload("720p order 5, still camera, turning light", Scene(path="still", script="turn")),
     Workload("720p order 5, blurred", sensor=_BLURRED),
     Workload("720p order 5, noisy", sensor=_NOISY),
     Workload("720p order 5, crf 28", crf=28),
-    *(
-        Workload(f"720p order 5, {name}", Scene(path="still", environment=name))
-        for name in ("apartment", "bridge", "studio")
-    ),
+    *(Workload(f"720p order 5, {name}", Scene(environment=name)) for name in ("apartment", "bridge", "studio")),
     # light so soft that a lower order suffices
     *(Workload(f"720p order 5, {name}", Scene(environment=name)) for name in ("overcast", "haze")),
 )

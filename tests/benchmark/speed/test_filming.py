@@ -64,7 +64,7 @@ def test_workloads_of_a_scene_differ_by_their_sensor_alone(tmp_path, tiny):
 
 
 def test_a_turning_light_turns(tmp_path):
-    workload = Workload("turning", Scene(1, (320, 240), "still", turning=True, sheet_width_px=230.0), half_cycle=2)
+    workload = Workload("turning", Scene(1, (320, 240), "still", script="turn", sheet_width_px=230.0), half_cycle=2)
     film([workload], tmp_path, lambda _name: None)
     truth = load_clip(tmp_path, workload).truth
     assert np.array_equal(truth[0].pose.translation, truth[2].pose.translation)
