@@ -9,17 +9,39 @@ typedef struct {
     const float *ratio; /* (side, side, 4) red, green, blue, unused */
     float *texels;      /* (2, all_columns) scratch: where a row of nodes lies on the map */
     int64_t first_row, first_column, rows, columns, all_rows, all_columns, side;
-    double texel_from_ray[9]; /* homogeneous (column, row) of the plane's point that a ray meets */
+    double texel_from_plane[6]; /* (column, row) of a point (x, y, 1) of the plane */
+    double ray_from_plane[9];   /* homogeneous ray of a point (x, y, 1) of the plane, row by row */
 } Plane;
 
+/* Homogeneous (column, row) of the plane's point that a ray meets, up to a factor. The adjugate is the inverse up to
+   one, and all zeros where the plane is seen edge-on. */
+static void texel_from_ray(const Plane *p, float m[9])
+{
+    const double *r = p->ray_from_plane, *t = p->texel_from_plane;
+    double sign = 0.0, adjugate[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const double *a = r + 3 * ((j + 1) % 3), *b = r + 3 * ((j + 2) % 3);
+            adjugate[3 * i + j] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+        }
+    for (int j = 0; j < 3; j++)
+        sign += adjugate[j] * r[3 * j];
+    /* a positive factor, so that what is in front stays in front */
+    double scale = sign < 0.0 ? -1.0 : 1.0;
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 2; i++)
+            m[3 * i + j] = (float)(scale * (t[3 * i] * adjugate[j] + t[3 * i + 1] * adjugate[3 + j]
+                                            + t[3 * i + 2] * adjugate[6 + j]));
+        m[6 + j] = (float)(scale * adjugate[6 + j]);
+    }
+}
+
 /* The points of the plane that a row of nodes sees, as texels; outside of the map above the horizon. */
-static HOT void locate(const Plane *p, int64_t row)
+static HOT void locate(const Plane *p, const float *m, int64_t row)
 {
     const float *x = p->rays + (p->first_row + row) * p->all_columns + p->first_column;
     const float *y = x + p->all_rows * p->all_columns;
-    float *restrict u = p->texels, *restrict v = p->texels + p->all_columns, m[9];
-    for (int i = 0; i < 9; i++)
-        m[i] = (float)p->texel_from_ray[i];
+    float *restrict u = p->texels, *restrict v = p->texels + p->all_columns;
     for (int64_t i = 0; i < p->columns; i++) {
         float w = m[6] * x[i] + m[7] * y[i] + m[8], inverse = w > 0.0f ? 1.0f / w : NAN;
         u[i] = (m[0] * x[i] + m[1] * y[i] + m[2]) * inverse;
@@ -45,9 +67,11 @@ static inline Four ratio_at(const Plane *p, float u, float v)
 EXPORT HOT void plane_left(const Plane *p)
 {
     int64_t count = p->rows * p->columns;
+    float m[9];
+    texel_from_ray(p, m);
     for (int64_t row = 0; row < p->rows; row++) {
         float *left = p->left + row * p->columns;
-        locate(p, row);
+        locate(p, m, row);
         for (int64_t i = 0; i < p->columns; i++) {
             Four ratio = ratio_at(p, p->texels[i], p->texels[p->all_columns + i]);
             for (int c = 0; c < 3; c++)

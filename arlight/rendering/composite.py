@@ -23,7 +23,8 @@ class _Plane(Workspace):
         *((name, ctypes.c_void_p) for name in ("left", "rays", "ratio", "texels")),
         *((name, ctypes.c_int64) for name in ("first_row", "first_column", "rows", "columns")),
         *((name, ctypes.c_int64) for name in ("all_rows", "all_columns", "side")),
-        ("texel_from_ray", ctypes.c_double * 9),
+        ("texel_from_plane", ctypes.c_double * 6),
+        ("ray_from_plane", ctypes.c_double * 9),
     )
 
 
@@ -43,13 +44,8 @@ class PlaneShader:
         rays = np.ascontiguousarray(camera.rays(nodes.reshape(-1, 2)).T, np.float32)
         self._plane = _Plane(all_rows=rows, all_columns=columns, side=grid.side)
         self._plane.hold({"rays": rays, "texels": np.empty((2, columns), np.float32)})
-        self._texel_from_plane = np.array(
-            [
-                [1.0 / grid.texel_mm, 0.0, -grid.corner_mm[0] / grid.texel_mm - 0.5],
-                [0.0, 1.0 / grid.texel_mm, -grid.corner_mm[1] / grid.texel_mm - 0.5],
-                [0.0, 0.0, 1.0],
-            ]
-        )
+        scale, (left_mm, lower_mm) = 1.0 / grid.texel_mm, grid.corner_mm
+        self._plane.texel_from_plane[:] = (scale, 0.0, -left_mm * scale - 0.5, 0.0, scale, -lower_mm * scale - 0.5)
 
     def left(self, region: Region, camera_from_probe: Pose, ratio: Image) -> Image:
         """What the object leaves of every pixel's light: the ratio at the point of the plane that it sees.
@@ -67,13 +63,8 @@ class PlaneShader:
             raise ValueError(f"expected a ratio of {plane.side} texels a side, found {ratio.shape}")
         rows, columns = nodes_of(region)
         left = np.empty((3, rows, columns), np.float32)
-        homography = np.column_stack([rotation[:, 0], rotation[:, 1], camera_from_probe.translation])
-        try:
-            texel_from_ray = self._texel_from_plane @ np.linalg.inv(homography)
-        except np.linalg.LinAlgError:
-            left.fill(1.0)  # seen edge-on the plane has no pixels
-            return left
-        plane.texel_from_ray[:] = texel_from_ray.reshape(-1).tolist()
+        r, t = rotation.ravel().tolist(), camera_from_probe.translation.tolist()
+        plane.ray_from_plane[:] = (r[0], r[1], t[0], r[3], r[4], t[1], r[6], r[7], t[2])
         plane.first_row, plane.first_column = region.y0 // NODE_PX, region.x0 // NODE_PX
         plane.rows, plane.columns = rows, columns
         plane.left, plane.ratio = address(left, np.float32), address(ratio, np.float32)

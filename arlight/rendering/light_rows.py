@@ -33,14 +33,15 @@ class LightRows:
         matrices = [np.asarray(part, np.float32) for part in parts]
         self._ends = np.cumsum([len(matrix) for matrix in matrices]).tolist()
         stacked = np.concatenate(matrices)
-        self._parts_of: NDArray[np.float64] | None = None
+        parts_of = np.eye(stacked.shape[1])
         if independent is not None:
             triangle = np.asarray(independent, float)
-            stacked, self._parts_of = stacked @ triangle.astype(np.float32), np.linalg.inv(triangle)
+            stacked, parts_of = stacked @ triangle.astype(np.float32), np.linalg.inv(triangle)
         blocks, self._count = -(-len(stacked) // _BLOCK), stacked.shape[1]
         # coefficients are taken in units in which they do as much as each other, so that rounding harms none more
-        self._unit = np.sqrt(np.mean(stacked**2, axis=0, dtype=float))[:, None]
-        codes, scale = _coded(stacked / np.maximum(self._unit.T, np.finfo(np.float32).tiny).astype(np.float32), blocks)
+        unit = np.sqrt(np.mean(stacked**2, axis=0, dtype=float))
+        codes, scale = _coded(stacked / np.maximum(unit, np.finfo(np.float32).tiny).astype(np.float32), blocks)
+        self._factors_of = unit[:, None] * parts_of
         self._lit = np.zeros((blocks * _BLOCK, 4), np.float32)
         self._held = codes, scale
         self._rows = (address(codes, np.int16), address(scale, np.float32), blocks, self._count)
@@ -60,12 +61,11 @@ class LightRows:
         if given.ndim != 2 or given.shape[1] != 3 or len(given) > self._count:
             raise ValueError(f"coefficients must be (k, 3), k at most {self._count}, found {given.shape}")
         k = len(given)
-        # the triangle's inverse is one too, and its corner inverts the triangle's corner
-        known = given if self._parts_of is None else self._parts_of[:k, :k] @ given
-        factors = np.ascontiguousarray(known * self._unit[:k], np.float32)
         # what was predicted or kept from the last frame is the same light
-        content = factors.tobytes()
+        content = given.tobytes()
         if content != self._last:
+            # the triangle's inverse is one too, and its corner inverts the triangle's corner
+            factors = (self._factors_of[:k, :k] @ given).astype(np.float32)
             _light(*self._rows, address(factors, np.float32), k, self._lit_address)
             self._last = content
         starts = [0, *self._ends[:-1]]

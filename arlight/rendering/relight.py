@@ -117,6 +117,7 @@ class Relighter:
         drawn = self.mesh if self._refinement is None else self._refinement.mesh
         self._vertices = np.ascontiguousarray(drawn.vertices_mm, np.float32)
         self._opened: ObjectDrawer | None = None
+        self._known: NDArray[np.int64] | None = None
 
     def render(
         self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, effort: Effort | None = None
@@ -226,11 +227,14 @@ class Relighter:
 
     def _packed(self, lighting: Lighting) -> NDArray[np.float32]:
         count = len(lighting.frequencies)
-        if not np.array_equal(lighting.frequencies, self._frequencies[:count]):
+        if lighting.frequencies is not self._known and not np.array_equal(
+            lighting.frequencies, self._frequencies[:count]
+        ):
             raise ValueError(
                 f"the lighting has {count} frequencies that are not the first of the relighter's "
                 f"{len(self._frequencies)}; make it with the probe and the order that the lighting was estimated with"
             )
+        self._known = lighting.frequencies
         return pack_real(lighting.coefficients).astype(np.float32)
 
     def _shadow_region(self, camera_from_probe: Pose) -> Region | None:

@@ -20,7 +20,7 @@ from arlight.video.frame import Frame
 from arlight.video.orientation import upright
 from arlight.video.pixel_format import PixelFormat
 from arlight.video.stream_format import ColourTags, chroma_location, colour_tags, pixel_format, planar_name
-from arlight.video.threads import codec_threads
+from arlight.video.threads import decoder_threads
 
 FALLBACK_RATE = Fraction(25)
 """Frames per second of a stream that states neither a rate nor times."""
@@ -204,7 +204,7 @@ def _picture_stream(container: InputContainer) -> VideoStream:
     """The stream to read, not a cover picture where there is another, ready to be decoded."""
     best = container.streams.best("video")
     stream = best if isinstance(best, VideoStream) else container.streams.video[0]
-    stream.thread_type, stream.codec_context.thread_count = "AUTO", codec_threads()
+    stream.thread_type, stream.codec_context.thread_count = "AUTO", decoder_threads()
     return stream
 
 

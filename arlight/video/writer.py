@@ -22,7 +22,7 @@ from arlight.video.frame import Frame
 from arlight.video.pixel_format import CHROMA_LOCATIONS, PixelFormat, chroma_offset_px, colour_format
 from arlight.video.reader import VideoReader
 from arlight.video.stream_format import tags_of
-from arlight.video.threads import codec_threads
+from arlight.video.threads import encoder_threads
 
 CONTAINERS = (".mp4", ".m4v", ".mov", ".mkv")
 """Endings of the containers that keep H.264 with its own times."""
@@ -165,7 +165,7 @@ class VideoWriter:
         stream.pix_fmt = "yuv420p" if self._format.bit_depth == 8 else "yuv420p10le"
         context = stream.codec_context
         context.time_base = stream.time_base = self._time_base
-        context.thread_count = codec_threads()
+        context.thread_count = encoder_threads()
         tags = tags_of(self._format, self._like.tags if self._like else None)
         context.colorspace, context.color_range, context.color_trc, context.color_primaries = tags
         if self._like and self._like.pixel_aspect:
