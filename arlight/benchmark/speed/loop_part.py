@@ -12,8 +12,6 @@ from arlight.pipeline import Pipeline
 from arlight.presets import EncodingSettings, Preset
 from arlight.rendering.relight import Relighter
 from arlight.results.frame_loop import FrameLoop, Sinks
-from arlight.results.log import LightingLogWriter
-from arlight.results.record import LogHeader
 from arlight.video.reader import VideoReader
 from arlight.video.repetition import repeat_clip
 from arlight.video.transcode import plain_transcode
@@ -88,8 +86,6 @@ def _run(
             sinks.video = VideoWriter(
                 folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.encoder_preset
             )
-            header = LogHeader.of(clip.probe, clip.camera, path.name, "probe.json")
-            sinks.log = LightingLogWriter(folder / "light.jsonl", header)
             with FrameLoop(reader, pipeline, sinks) as records:
                 for record in records:
                     for stage, ms in record.timings_ms.items():
