@@ -40,7 +40,7 @@ def measure_loop(
     repeat_clip(clip.path, short, float(_WARM_UP_FRAMES / FRAME_RATE))
     count = repeat_clip(clip.path, long, float(frames / FRAME_RATE))
     pipeline = Pipeline(clip.probe, clip.camera, relighter, preset.tracker)
-    _run(short, clip, pipeline, preset.encoding, folder, {})
+    _run(short, pipeline, preset.encoding, folder, {})
     loop_s, loop_cpu_s, transcode_s, transcode_cpu_s = [], [], [], []
     stages_ms: dict[str, list[float]] = {}
     for _ in range(repeats):
@@ -49,7 +49,7 @@ def measure_loop(
         transcode_cpu_s.append(process_time() - cpu_s)
         pipeline.reset()
         cpu_s = process_time()
-        loop_s.append(_run(long, clip, pipeline, preset.encoding, folder, stages_ms))
+        loop_s.append(_run(long, pipeline, preset.encoding, folder, stages_ms))
         loop_cpu_s.append(process_time() - cpu_s)
     name, ratio = f"loop, {clip.workload.name}", paired_ratio(loop_s, transcode_s)
     found = Findings(ratios={name: Ratio(ratio, TRANSCODE, 1e3 * spread(loop_s).median / count)})
@@ -73,7 +73,6 @@ def measure_loop(
 
 def _run(
     path: Path,
-    clip: FilmedClip,
     pipeline: Pipeline,
     encoding: EncodingSettings,
     folder: Path,
