@@ -18,7 +18,8 @@ from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.nuisance import Nuisance
-from arlight.estimation.order_choice import Need, OrderChoice
+from arlight.estimation.order_choice import OrderChoice
+from arlight.estimation.shown_light import Need
 from arlight.fourier import frequency_order, orders_up_to
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe

@@ -8,7 +8,7 @@ from arlight.budget import BudgetController
 from arlight.camera import Camera, Pose
 from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.lighting_tracker import BlockEstimator, FrameEstimate, LightingTracker, TrackerSettings
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe

@@ -10,7 +10,7 @@ from arlight.camera import Camera
 from arlight.color import encoded_from_linear
 from arlight.effort import Effort
 from arlight.errors import CameraError, ProbeError, RenderingUnavailableError
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.fourier import frequency_order
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.layout import design_probe

@@ -9,7 +9,7 @@ import pytest
 import arlight
 from arlight.budget import BudgetController, Rung
 from arlight.effort import Effort
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.pipeline import Pipeline
 from arlight.probe.layout import design_probe
 from arlight.synthetic.settings import SynthesisSettings, default_camera

@@ -7,7 +7,7 @@ from arlight.camera import Camera, Pose
 from arlight.commands.options.relighting import RelightingOptions
 from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.pipeline import FrameRelighter
 from arlight.probe.design import Probe
 from arlight.rendering.default_object import default_object

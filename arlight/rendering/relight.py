@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from arlight.camera import Camera, Pose
 from arlight.effort import Effort
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.fourier import orders_up_to, pack_real
 from arlight.optics import Slab
 from arlight.rendering.appearance import Appearance, appearance

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need, OrderChoice
+from arlight.estimation.order_choice import OrderChoice
+from arlight.estimation.shown_light import Need
 from arlight.fourier import frequency_order, half_plane_frequencies, unpack_real
 
 FREQUENCIES = half_plane_frequencies(4)

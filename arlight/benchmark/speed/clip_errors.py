@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from arlight.benchmark.evaluation import order_error
 from arlight.camera import Camera, Pose
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.fourier import frequency_order, pack_real
 from arlight.probe.design import Probe
 from arlight.rendering.relight import Relighter

@@ -13,7 +13,7 @@ from arlight.benchmark.speed.relighters import Relighters
 from arlight.benchmark.speed.spread import block_means, paired_ratio
 from arlight.camera import Camera
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.lighting_tracker import LightingTracker, TrackerSettings
 from arlight.probe.design import Probe
 from arlight.rendering.settings import RelightSettings

@@ -17,7 +17,7 @@ from arlight.benchmark.speed.clip_errors import (
 from arlight.benchmark.speed.relighters import Relighters
 from arlight.camera import Pose
 from arlight.estimation.lighting import Lighting
-from arlight.estimation.order_choice import Need
+from arlight.estimation.shown_light import Need
 from arlight.fourier import pack_real
 from arlight.rendering.settings import RelightSettings
 
