@@ -1,8 +1,11 @@
 """The parts of the benchmark, in order: what each measures, on which workloads, how often."""
 
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 from arlight.benchmark.speed import growth_part
@@ -174,18 +177,25 @@ class Suite:
         return measure_order(self.clip(name), 72, self.relighters)
 
     def _april_tags(self) -> Findings:
-        clip = self.clip(APRIL_TAGS.name)
-        try:
-            yardstick = AprilTagPose(clip.probe, clip.camera)
-        except ImportError:
-            return Findings(notes=["AprilTags were left out: install pupil-apriltags, as in arlight[bench]"])
-        return measure_tracking(clip, self._count(48, 96), yardstick)
+        # in a process of its own: the library may damage the memory of the one it runs in
+        with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+            measured = pool.submit(_measure_april_tags, self.clip(APRIL_TAGS.name), self._count(48, 96))
+            try:
+                return measured.result()
+            except ImportError:
+                return Findings(notes=["AprilTags were left out: install pupil-apriltags, as in arlight[bench]"])
+            except BrokenProcessPool:
+                return Findings(notes=["AprilTags were left out: pupil-apriltags ended its process"])
 
     def _memory(self) -> Findings:
         return measure_memory(self.clip(HEADLINE), (_SHORT_S, self.length_s), self.scratch)
 
     def _count(self, quick: int, full: int) -> int:
         return quick if self.quick else full
+
+
+def _measure_april_tags(clip: FilmedClip, frames: int) -> Findings:
+    return measure_tracking(clip, frames, AprilTagPose(clip.probe, clip.camera))
 
 
 _GROWTH: dict[str, Callable[[Suite], Findings]] = {
