@@ -50,17 +50,19 @@ static HOT float sum_list(int total, const float *restrict values, float *least)
 static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
     int quarter = (int)b->limit / 4, limit = quarter + (quarter < FEW_CELLS ? quarter : FEW_CELLS);
-    int total = list_points(b, block, grid, limit, CELLS);
-    float *c = list_of(b, PHASE_LIST), *s = list_of(b, SINE_LIST), *values = list_of(b, CODE_LIST);
-    float *luma = list_of(b, LIGHT_LIST);
+    int total = list_points(b, block, 0, grid, limit, CELLS);
+    float *c = list_of(b, 0, PHASE_LIST), *s = list_of(b, 0, SINE_LIST), *values = b->lists;
+    float *luma = list_of(b, 0, LIGHT_LIST);
     turn_all(total, c, s);
     if (limited)
         limit_luma(b->harmonics[block], total, limit_of(b, block), luma, c, s, values + 2 * b->room);
     else
         memcpy(values + 2 * b->room, luma, (size_t)total * sizeof *luma);
     for (int k = PHASE_LIST; k <= LIGHT_LIST; k++)
-        clear_rest(list_of(b, k), total);
-    sum_block(b->harmonics[block] > 0, total, c, s, list_of(b, X_LIST), list_of(b, Y_LIST), values, b->room, sums);
+        clear_rest(list_of(b, 0, k), total);
+    for (int k = 0; k < CHANNELS; k++)
+        clear_rest(values + k * b->room, total);
+    sum_block(b->harmonics[block] > 0, total, c, s, list_of(b, 0, X_LIST), list_of(b, 0, Y_LIST), values, b->room, sums);
     double over = total ? 1.0 / total : 0.0;
     chroma->mean[0] = sum_list(total, luma, &chroma->darkest) * over;
     chroma->mean[1] = sums->right[0][0] * over;

@@ -24,8 +24,9 @@ _LANES, _STEP = 16, 8
 _LINE = 16
 """Floats of a cache line."""
 _EDGES, _CUBIC, _TERMS, _HUES = 8, 4, 16, 3
-LISTS = 10 + 16 + 3 + 4
-"""Lists of pixels; of a cubic fit's columns, its values, and what is read with them."""
+LISTS = 3 + 8 * 7 + 16 + 3 + 4
+"""Lists of pixels: of codes, of eight blocks at a time, and of a cubic fit's columns, its values, and what is read with
+them."""
 TINT = 1 + ROWS + 3
 SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
 """Floats of `Tint` and `Sums` of blocks.h."""
@@ -252,7 +253,7 @@ def _views(n: int) -> dict[str, NDArray[np.generic]]:
 
 
 def _prepare_lists(shared: Shared, samples: int) -> None:
-    """Memory for the pixels of one block, `samples` at most."""
+    """Memory for the pixels of the blocks that are fitted together, `samples` each at most."""
     height = shared.height
     room = (min(samples, shared.width * height) + 2 * _STEP + _LINE - 1) // _LINE * _LINE
     shared.limit, shared.room = samples, room

@@ -69,6 +69,15 @@ static HOT void fill_cubic(SmallFits *f, int l, int total, int64_t room, const f
         }
 }
 
+/* Blocks of one number of harmonics that wait to be fitted together. */
+typedef struct {
+    SmallFits fits;
+    int some, used[FITS]; /* pixels of each */
+    int32_t blocks[FITS];
+    float squares[FITS][CHANNELS];
+    double brightest; /* of all blocks so far */
+} Lamps;
+
 /* Makes a fit the same as the first. */
 static void repeat_fit(SmallFits *f, int l)
 {
@@ -80,28 +89,30 @@ static void repeat_fit(SmallFits *f, int l)
     }
 }
 
-/* Blocks that mirror a lamp in the film are fitted once more with a shading of third degree. */
-static void fit_lamps(const Blocks *b, const int32_t *order, int some, const float level[CHANNELS])
+/* Fits the blocks that wait. */
+static void fit_lamps(const Blocks *b, Lamps *lamps)
 {
-    SmallFits fits;
-    fits.rights = CHANNELS;
-    Grid grid = grid_of(b, 0);
-    int used[FITS];
-    float squares[FITS][CHANNELS];
-    int32_t blocks[FITS];
-    for (int l = 0; l < some; l++) {
-        blocks[l] = b->order[order[l]];
-        Pixels p = usable_pixels(b, order[l], &grid, level, NULL);
-        float *lists = list_of(b, LISTS);
-        fits.columns = list_columns(b->harmonics[blocks[l]], &p, b->room, lists);
-        memcpy(lists + fits.columns * b->room, p.light, (size_t)(CHANNELS * b->room) * sizeof *lists);
-        fill_cubic(&fits, l, p.total, b->room, lists, squares[l]);
-        used[l] = p.total;
-    }
-    for (int l = some; l < FITS; l++)
-        repeat_fit(&fits, l);
-    solve_fits(&fits);
-    keep_fits(b, &fits, blocks, some, used, (const float(*)[CHANNELS])squares);
+    if (lamps->some == 0)
+        return;
+    for (int l = lamps->some; l < FITS; l++)
+        repeat_fit(&lamps->fits, l);
+    solve_fits(&lamps->fits);
+    keep_fits(b, &lamps->fits, lamps->blocks, lamps->some, lamps->used, (const float(*)[CHANNELS])lamps->squares);
+    lamps->some = 0;
+}
+
+/* Has a block wait to be fitted with shading of third degree. */
+static void add_lamp(const Blocks *b, int block, const Pixels *p, Lamps *lamps)
+{
+    if (lamps->some == FITS || (lamps->some && b->harmonics[block] != b->harmonics[lamps->blocks[0]]))
+        fit_lamps(b, lamps);
+    float *lists = b->lists + FIT_LISTS * b->room;
+    int l = lamps->some++, columns = list_columns(b->harmonics[block], p, b->room, lists);
+    memcpy(lists + columns * b->room, p->light, (size_t)(CHANNELS * b->room) * sizeof *lists);
+    lamps->fits.columns = columns, lamps->fits.rights = CHANNELS;
+    fill_cubic(&lamps->fits, l, p->total, b->room, lists, lamps->squares[l]);
+    lamps->used[l] = p->total;
+    lamps->blocks[l] = block;
 }
 
 static double largest_of(const double *values)
@@ -109,29 +120,19 @@ static double largest_of(const double *values)
     return fmax(values[0], fmax(values[1], values[2]));
 }
 
-/* Refits the blocks whose pixels stray from their stripes. What a straight slope leaves is as uneven as the slope. */
-static void treat_lamps(const Blocks *b, int count, const float level[CHANNELS], double *uneven)
+/* Has the blocks wait whose pixels stray from their stripes. What a straight slope leaves is as uneven as the slope. */
+static void find_lamps(const Blocks *b, const int32_t *order, int some, const Pixels *pixels, Lamps *lamps)
 {
-    double brightest = 1e-6;
-    for (int at = 0; at < count; at++)
-        brightest = fmax(brightest, largest_of(b->values + (int64_t)b->order[at] * ROWS * CHANNELS));
-    double limit = LAMP_DEVIATION * brightest;
-    int32_t lamps[FITS];
-    int some = 0;
-    memcpy(uneven, b->shading, (size_t)b->blocks * CHANNELS * sizeof *uneven);
-    for (int at = 0; at <= count; at++) {
-        int lamp = at < count && largest_of(b->variance + (int64_t)b->order[at] * CHANNELS) > limit * limit;
-        int other = some && lamp && b->harmonics[b->order[at]] != b->harmonics[b->order[lamps[0]]];
-        if (some == FITS || other || (some && at == count)) {
-            fit_lamps(b, lamps, some, level);
-            some = 0;
-        }
-        if (!lamp)
+    for (int l = 0; l < some; l++)
+        lamps->brightest = fmax(lamps->brightest, largest_of(b->values + (int64_t)order[l] * ROWS * CHANNELS));
+    double limit = LAMP_DEVIATION * lamps->brightest;
+    for (int l = 0; l < some; l++) {
+        double *variance = b->variance + (int64_t)order[l] * CHANNELS;
+        if (!(largest_of(variance) > limit * limit))
             continue;
-        int64_t block = b->order[at];
         for (int c = 0; c < CHANNELS; c++)
-            uneven[block * CHANNELS + c] += sqrt(b->variance[block * CHANNELS + c]);
-        lamps[some++] = at;
+            b->shading[(int64_t)order[l] * CHANNELS + c] += sqrt(variance[c]);
+        add_lamp(b, order[l], pixels + l, lamps);
     }
 }
 

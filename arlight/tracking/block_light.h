@@ -87,7 +87,7 @@ static HOT float mean_light(const Pixels *p, int64_t room, int channel)
 static HOT int32_t find_places(const Blocks *b, int block, int channel, const Pixels *p)
 {
     const Tint *tint = b->tints + block * CHANNELS + channel;
-    const float *c = p->cosine, *s = p->sine, *codes = list_of(b, CODE_LIST), *others = codes + b->room;
+    const float *c = p->cosine, *s = p->sine, *codes = b->lists, *others = codes + b->room;
     int32_t last = (int32_t)b->entries - 1, *places = b->places;
     int harmonics = b->harmonics[block], total = p->total;
     if (b->shift_x == 0 && b->shift_y == 0)
@@ -106,27 +106,27 @@ static HOT int32_t find_places(const Blocks *b, int block, int channel, const Pi
 /* Turns phases into cosines and sines, and limits the luma that chroma is scaled with. */
 static HOT void prepare_pixels(const Blocks *b, int block, const Pixels *p)
 {
-    float *luma = list_of(b, CODE_LIST);
+    float *luma = b->lists;
     turn_all(p->total, p->cosine, p->sine);
     if (b->shift_x > 0 || b->shift_y > 0)
         limit_luma(b->harmonics[block], p->total, limit_of(b, block), luma, p->cosine, p->sine, luma + b->room);
 }
 
-/* Lists the pixels of a block and their light. */
-static Pixels light_pixels(const Blocks *b, int block, const Grid *grid)
+/* Lists the pixels of a block and their light. place: as for `list_of`. */
+static Pixels light_pixels(const Blocks *b, int block, int place, const Grid *grid)
 {
     int what = b->shift_x > 0 || b->shift_y > 0 ? LUMA : ALL_PLANES;
-    int total = list_points(b, block, grid, (int)b->limit, what);
-    Pixels p = {total, {0}, list_of(b, PHASE_LIST), list_of(b, SINE_LIST), list_of(b, X_LIST),
-                list_of(b, Y_LIST), list_of(b, LIGHT_LIST)};
+    int total = list_points(b, block, place, grid, (int)b->limit, what);
+    Pixels p = {total, {0}, list_of(b, place, PHASE_LIST), list_of(b, place, SINE_LIST), list_of(b, place, X_LIST),
+                list_of(b, place, Y_LIST), list_of(b, place, LIGHT_LIST)};
     prepare_pixels(b, block, &p);
     for (int c = 0; c < CHANNELS; c++) {
         p.largest[c] = find_places(b, block, c, &p);
         look_up(b->light, p.total, b->places, p.light + c * b->room);
         clear_rest(p.light + c * b->room, p.total);
     }
-    for (int k = PHASE_LIST; k <= SINE_LIST; k++)
-        clear_rest(list_of(b, k), p.total);
+    for (int k = PHASE_LIST; k < LIGHT_LIST; k++)
+        clear_rest(list_of(b, place, k), p.total);
     return p;
 }
 

@@ -3,14 +3,18 @@
 #define ARLIGHT_BLOCK_POINTS_H
 
 #include "block_spans.h"
+#include "small_fit.h"
 
-/* Lists of pixels. */
-enum { PHASE_LIST, X_LIST, Y_LIST, SINE_LIST, CODE_LIST, LIGHT_LIST = CODE_LIST + CHANNELS };
-enum { LISTS = LIGHT_LIST + CHANNELS };
+/* Lists of a block's cells: of cos and sin of the phase, the phase itself to begin with, of the place, and of light. */
+enum { PHASE_LIST, SINE_LIST, X_LIST, Y_LIST, LIGHT_LIST, KEPT = LIGHT_LIST + CHANNELS };
+/* Lists there are: values of codes, those of the blocks that are fitted together, and what fits with a curved shading
+ * are made of. */
+enum { KEPT_LISTS = CHANNELS, FIT_LISTS = KEPT_LISTS + FITS * KEPT, LISTS = FIT_LISTS + COLUMNS + CHANNELS + 4 };
 
-INLINE float *list_of(const Blocks *b, int which)
+/* Which of the blocks that are fitted together: where its lists are. */
+INLINE float *list_of(const Blocks *b, int place, int which)
 {
-    return b->lists + which * b->room;
+    return b->lists + (KEPT_LISTS + place * KEPT + which) * b->room;
 }
 
 /* Some neighbours in a list, and their columns. */
@@ -126,15 +130,15 @@ INLINE void list_some(const Reader *s, Cells cells, int single, int what)
         list_steps(s, cells, single, what, s->bytes, s->down);
 }
 
-static Reader reader_of(const Blocks *b, int block, int what, const Grid *grid)
+static Reader reader_of(const Blocks *b, int block, int place, int what, const Grid *grid)
 {
     int cells = what == CELLS;
     float scale = 1.0f / b->box[2 * b->blocks + block];
     Reader s = {.luma_stride = b->stride[0], .bytes = (int)b->bytes, .across = cells ? (int)grid->step_x : 1,
                 .down = cells ? (int)grid->step_y : 1, .width = grid->width, .height = grid->height,
                 .left = (grid->first_x - b->box[block]) * scale, .step = grid->step_x * scale,
-                .phase = list_of(b, PHASE_LIST), .x = list_of(b, X_LIST), .y = list_of(b, Y_LIST),
-                .luma = list_of(b, LIGHT_LIST)};
+                .phase = list_of(b, place, PHASE_LIST), .x = list_of(b, place, X_LIST),
+                .y = list_of(b, place, Y_LIST), .luma = list_of(b, place, LIGHT_LIST)};
     s.together = grid->width >= 2 * STEP && (!cells || (s.across == 2 && s.down <= 2));
     for (int plane = 0; plane < CHANNELS; plane++) {
         s.from[plane] = b->planes[plane];
@@ -159,10 +163,10 @@ INLINE void expand_rows(const Blocks *b, int block, const Grid *grid, const Span
 
 /* Fills the lists of phase, x, y and of the planes' codes, for CELLS also that of their luma's sums. Returns how many
  * cells there are. */
-static HOT int list_cells(const Blocks *b, int block, const Grid *grid, const Span *span, int what)
+static HOT int list_cells(const Blocks *b, int block, int place, const Grid *grid, const Span *span, int what)
 {
     expand_rows(b, block, grid, span);
-    Reader s = reader_of(b, block, what, grid);
+    Reader s = reader_of(b, block, place, what, grid);
     Cells cells = {.at = 0};
     for (int r = 0, first = 0, next = 0; r < span->rows; r++) {
         int steps = whole_steps(span->count[r]) / STEP;
@@ -232,18 +236,18 @@ INLINE void fetch_block(const Blocks *b, int block, int planes)
 
 /* Lists the cells of a block, `limit` at most, and the planes' values; for CELLS Cb and Cr, and their mean luma in the
  * list of light. Returns how many there are. */
-static HOT int list_points(const Blocks *b, int block, const Grid *grid, int limit, int what)
+static HOT int list_points(const Blocks *b, int block, int place, const Grid *grid, int limit, int what)
 {
     Span span = span_of(b, block, grid);
     if (span.total > limit)
         thin_out(&span, limit);
-    int total = list_cells(b, block, grid, &span, what);
-    float *values = list_of(b, CODE_LIST);
+    int total = list_cells(b, block, place, grid, &span, what);
+    float *values = b->lists;
     for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
         convert_codes(b, plane, total, values + (plane - (what == CELLS)) * b->room);
     if (what != CELLS)
         return total;
-    float *luma = list_of(b, LIGHT_LIST), scale = (float)b->scale[0] / (grid->step_x * grid->step_y);
+    float *luma = list_of(b, place, LIGHT_LIST), scale = (float)b->scale[0] / (grid->step_x * grid->step_y);
     float offset = (float)(b->offset[0] * b->scale[0]);
     int steps = whole_steps(total) & -STEP;
     for (int i = 0; i < steps; i++)

@@ -53,8 +53,6 @@ static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *ord
                 values[i * CHANNELS + c] = fits->solved[c][i][l];
             double left = squares[l][c] - fits->explained[c][l];
             b->variance[block * CHANNELS + c] = fmax(left, 0.0) / (used[l] - fits->columns);
-            double slope_x = fits->solved[c][kept][l], slope_y = fits->solved[c][kept + 1][l];
-            b->shading[block * CHANNELS + c] = sqrt(slope_x * slope_x + slope_y * slope_y);
         }
         for (int i = 0; i < kept; i++)
             for (int j = 0; j <= i; j++)
@@ -62,8 +60,17 @@ static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *ord
     }
 }
 
+/* Writes out how steep the shading of some blocks' fits is. */
+static void keep_slopes(const Blocks *b, const SmallFits *fits, const int32_t *order, int some)
+{
+    int x = 1 + 2 * b->harmonics[order[0]];
+    for (int l = 0; l < some; l++)
+        for (int c = 0; c < CHANNELS && b->samples[order[l]] > 0; c++)
+            b->shading[(int64_t)order[l] * CHANNELS + c] = hypot(fits->solved[c][x][l], fits->solved[c][x + 1][l]);
+}
+
 /* Everything in units of light without vignetting. */
-static void finish(const Blocks *b, const double *uneven)
+static void finish(const Blocks *b)
 {
     int64_t n = b->blocks;
     for (int64_t i = 0; i < n; i++) {
@@ -73,7 +80,7 @@ static void finish(const Blocks *b, const double *uneven)
             b->values[i * ROWS * CHANNELS + k] *= over;
         for (int c = 0; c < CHANNELS; c++) {
             b->variance[i * CHANNELS + c] *= over * over;
-            b->shading[i * CHANNELS + c] = uneven[i * CHANNELS + c] * over;
+            b->shading[i * CHANNELS + c] *= over;
         }
         b->cycles[2 * i] = b->frequency[i], b->cycles[2 * i + 1] = b->frequency[n + i];
         b->resolved[i] = b->samples[i] > 0 ? b->harmonics[i] : 0;

@@ -9,6 +9,12 @@
 #define LAMP_OVER_AVERAGE 1.5 /* light over its block's mean from which a pixel beyond white shows a lamp */
 #define MOST_WHITES 256       /* white blocks that are asked how bright white is */
 
+/* How bright white is: means of white blocks, and what follows from them; a level of 0 is not known. */
+typedef struct {
+    int known;
+    float mean[MOST_WHITES][CHANNELS], level[CHANNELS];
+} White;
+
 static void sort(float *values, int count)
 {
     for (int i = 1; i < count; i++)
@@ -19,18 +25,27 @@ static void sort(float *values, int count)
         }
 }
 
-/* Lower quartile of the white blocks' means: some may mirror a lamp themselves. 0 without white blocks. */
-static float white_level(const float (*mean)[CHANNELS], int whites, int channel)
+/* Finds the level: the lower quartile of the blocks' means, some of which may mirror a lamp themselves. */
+static void find_level(White *white)
 {
-    float values[MOST_WHITES];
-    int count = whites < MOST_WHITES ? whites : MOST_WHITES;
-    for (int i = 0; i < count; i++)
-        values[i] = mean[i][channel];
-    sort(values, count);
-    float at = 0.25f * (float)(count - 1);
-    int below = (int)at;
-    int above = below + 1 < count ? below + 1 : below;
-    return count == 0 ? 0.0f : values[below] + (at - (float)below) * (values[above] - values[below]);
+    float values[MOST_WHITES], at = 0.25f * (float)(white->known - 1);
+    int below = (int)at, above = below + 1 < white->known ? below + 1 : below;
+    for (int c = 0; c < CHANNELS && white->known; c++) {
+        for (int i = 0; i < white->known; i++)
+            values[i] = white->mean[i][c];
+        sort(values, white->known);
+        white->level[c] = values[below] + (at - (float)below) * (values[above] - values[below]);
+    }
+}
+
+/* Notes how bright a white block is. */
+static void note_white(White *white, const Pixels *p, int64_t room)
+{
+    if (p->total < LEAST_SAMPLES || white->known == MOST_WHITES)
+        return;
+    for (int c = 0; c < CHANNELS; c++)
+        white->mean[white->known][c] = mean_light(p, room, c);
+    white->known++;
 }
 
 /* Leaves out the pixels that are brighter than the ceiling in any channel. */
@@ -55,31 +70,43 @@ static void leave_out(Pixels *p, int64_t room, const float ceiling[CHANNELS])
         clear_rest(p->light + c * room, kept);
 }
 
-/* Lists a block's pixels without those that show a lamp. level: of white, 0 where it is not known; mean: of all the
- * pixels, where it is asked for. */
-static Pixels usable_pixels(const Blocks *b, int at, const Grid *grid, const float level[CHANNELS], float *mean)
+/* The light from which a block's pixels show a lamp in each channel. Returns whether any pixel is brighter. */
+static int find_ceiling(const Blocks *b, int block, const White *white, const Pixels *p, float ceiling[CHANNELS])
 {
-    int block = b->order[at], over = 0;
-    Pixels p = light_pixels(b, block, grid);
-    float ceiling[CHANNELS];
-    b->gathered[block] = p.total;
+    int over = 0;
     for (int c = 0; c < CHANNELS; c++) {
-        if (mean)
-            mean[c] = mean_light(&p, b->room, c);
-        int known = level[c] > 0.0f && !(b->flags[block] & WHITE);
-        float largest = b->light[p.largest[c]], lifted = (float)BRIGHTEST_STRIPE * level[c];
+        int known = white->level[c] > 0.0f && !(b->flags[block] & WHITE);
+        float largest = b->light[p->largest[c]], lifted = (float)BRIGHTEST_STRIPE * white->level[c];
         /* an evenly bright mirror image, the sky's at grazing view, lifts its block's stripes and hides none */
         if (known && largest > lifted)
-            lifted = fmaxf(lifted, (float)LAMP_OVER_AVERAGE * mean_light(&p, b->room, c));
+            lifted = fmaxf(lifted, (float)LAMP_OVER_AVERAGE * mean_light(p, b->room, c));
         ceiling[c] = known && lifted < (float)b->clip ? lifted : (float)b->clip;
         over |= largest > ceiling[c];
     }
-    if (over) {
-        Sums all;
-        sum_block(0, p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, &all);
-        average_look(b, block, &all);
+    return over;
+}
+
+/* Lists a block's pixels without those that show a lamp, and sums over them. at: in the order; place: as for
+ * `list_of`. */
+static Pixels usable_pixels(const Blocks *b, int at, int place, const Grid *grid, White *white)
+{
+    int block = b->order[at];
+    Pixels p = light_pixels(b, block, place, grid);
+    Sums *sums = b->sums + at;
+    float ceiling[CHANNELS];
+    b->gathered[block] = p.total;
+    if (b->flags[block] & WHITE)
+        note_white(white, &p, b->room);
+    if (find_ceiling(b, block, white, &p, ceiling)) {
+        sum_block(0, p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, sums);
+        average_look(b, block, sums);
         leave_out(&p, b->room, ceiling);
+        sum_block(b->harmonics[block], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, sums);
+        return p;
     }
+    sum_block(b->harmonics[block], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, sums);
+    if (p.total > 0)
+        average_look(b, block, sums);
     return p;
 }
 

@@ -48,48 +48,47 @@ static void infer_colour(const Blocks *b, int count)
     }
 }
 
-/* Sums over the usable pixels of every block; level: of white. */
-static void sum_blocks(const Blocks *b, int whites, int count, float level[CHANNELS])
-{
-    Grid grid = grid_of(b, 0);
-    float mean[MOST_WHITES][CHANNELS];
-    int known = 0, planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : CHANNELS;
-    for (int c = 0; c < CHANNELS; c++)
-        level[c] = 0.0f;
-    for (int at = 0; at < count; at++) {
-        if (at == whites)
-            for (int c = 0; c < CHANNELS; c++)
-                level[c] = white_level((const float(*)[CHANNELS])mean, known, c);
-        int white = at < whites && known < MOST_WHITES;
-        fetch_block(b, b->order[at + AHEAD < count ? at + AHEAD : count - 1], planes);
-        Pixels p = usable_pixels(b, at, &grid, level, white ? mean[known] : NULL);
-        sum_block(b->harmonics[b->order[at]], p.total, p.cosine, p.sine, p.x, p.y, p.light, b->room, b->sums + at);
-        if (p.total > 0 && p.total == b->gathered[b->order[at]])
-            average_look(b, b->order[at], b->sums + at);
-        known += white && b->gathered[b->order[at]] >= LEAST_SAMPLES;
-    }
-}
-
-static void fit_blocks(const Blocks *b, int count)
+/* Fits some blocks together; pixels: as their lists hold them. */
+static void fit_blocks(const Blocks *b, int at, int some, const Pixels *pixels)
 {
     SmallFits fits;
+    int used[FITS];
+    float squares[FITS][CHANNELS];
     fits.rights = CHANNELS;
-    for (int at = 0, some; at < count; at += some) {
-        int used[FITS];
-        float squares[FITS][CHANNELS];
-        some = alike(b, at, count);
-        fill_fits(&fits, b->sums + at, some, b->harmonics[b->order[at]], 1);
-        for (int l = 0; l < some; l++) {
-            used[l] = (int)b->sums[at + l].cosine[0];
-            memcpy(squares[l], b->sums[at + l].squares, sizeof squares[l]);
-        }
-        solve_fits(&fits);
-        keep_fits(b, &fits, b->order + at, some, used, (const float(*)[CHANNELS])squares);
+    fill_fits(&fits, b->sums + at, some, b->harmonics[b->order[at]], 1);
+    for (int l = 0; l < some; l++) {
+        used[l] = pixels[l].total;
+        memcpy(squares[l], b->sums[at + l].squares, sizeof squares[l]);
     }
+    solve_fits(&fits);
+    keep_fits(b, &fits, b->order + at, some, used, (const float(*)[CHANNELS])squares);
+    keep_slopes(b, &fits, b->order + at, some);
+}
+
+/* Reads and fits all blocks, those of one number of harmonics together. */
+static void fit_all(const Blocks *b, int whites, int count)
+{
+    Grid grid = grid_of(b, 0);
+    White white = {0};
+    Lamps lamps = {.brightest = 1e-6};
+    Pixels pixels[FITS];
+    int planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : CHANNELS;
+    for (int at = 0, some; at < count; at += some) {
+        if (at == whites)
+            find_level(&white);
+        some = alike(b, at, at < whites ? whites : count);
+        for (int l = 0; l < some; l++) {
+            fetch_block(b, b->order[at + l + AHEAD < count ? at + l + AHEAD : count - 1], planes);
+            pixels[l] = usable_pixels(b, at + l, l, &grid, &white);
+        }
+        fit_blocks(b, at, some, pixels);
+        find_lamps(b, b->order + at, some, pixels, &lamps);
+    }
+    fit_lamps(b, &lamps);
 }
 
 /* Bytes of what is shared with Python, and lists of pixels. */
-EXPORT const int64_t block_memory[] = {sizeof(Blocks), sizeof(Sums), sizeof(Tint), LISTS + COLUMNS + CHANNELS + 4};
+EXPORT const int64_t block_memory[] = {sizeof(Blocks), sizeof(Sums), sizeof(Tint), LISTS};
 
 /* Rays (2, count) of pixels (2, count), of whole LANES. */
 EXPORT HOT void undistort_pixels(const Blocks *b, int64_t rounds, int64_t count, const float *pixels, float *rays)
@@ -117,15 +116,11 @@ EXPORT void survey_blocks(const Blocks *b)
 EXPORT void measure_blocks(const Blocks *b)
 {
     int whites;
-    float level[CHANNELS];
-    double uneven[b->blocks * CHANNELS];
     clear_results(b);
     view_blocks(b);
     int count = put_in_order(b, &whites);
     if (b->shift_x > 0 || b->shift_y > 0)
         infer_colour(b, count);
-    sum_blocks(b, whites, count, level);
-    fit_blocks(b, count);
-    treat_lamps(b, count, level, uneven);
-    finish(b, uneven);
+    fit_all(b, whites, count);
+    finish(b);
 }

@@ -60,7 +60,7 @@ typedef struct {
     float *rows;           /* (height, TERMS) coefficients in each row; also limits (2, height) */
     int32_t *places;       /* (CHANNELS, room) */
     char *codes;           /* (CHANNELS, room) of 2 bytes at most */
-    float *lists;          /* (LISTS + COLUMNS + CHANNELS + 4, room) */
+    float *lists;          /* (LISTS, room) */
     float *hue;            /* (n, HUES, HUE) of Cb and Cr; most luma that chroma is scaled with, and least over most */
     Tint *tints;           /* (n, CHANNELS) */
     double *mean_code;     /* (n, 3) mean luma and chroma where chroma is shared */
