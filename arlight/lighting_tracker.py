@@ -196,8 +196,8 @@ class LightingTracker:
             )
             measured = self._clock()
             estimate = self._estimator.estimate(means, frame.time_s, nuisance, order)
-            if last is not None and blocks is not None:
-                estimate = estimate.with_stripes_elsewhere(blocks, last.stripes)
+            if last is not None:
+                estimate = estimate.guiding_on(blocks, last.stripes)
             last = estimate
         assert last is not None
         self._last = last

@@ -31,6 +31,8 @@ ITERATIONS = 2
 """How often a frame's weights and solution are refined after the first frame: with less, a lamp that comes into a block
 spoils the frame; more changes nothing."""
 _FIRST_ITERATIONS = 4
+_HALFWAY = 0.5
+"""Of the last stripes and the new ones, what guides the next frame; overshoots of up to three times die away."""
 _native = library(__file__, "guide", keeps_lock=True)
 _native.guide.argtypes = (ctypes.c_void_p,) * 5
 
@@ -50,9 +52,19 @@ class Estimate:
     unexplained: float
     """Share of the stripes that no light explains on this sheet, as green shows it; nan where they are not resolved."""
 
-    def with_stripes_elsewhere(self, measured: NDArray[np.bool_], stripes: Array) -> "Estimate":
-        """The same, with the stripes (blocks, 7, 3) of an earlier frame in the blocks that were not measured."""
-        return replace(self, stripes=np.where(measured[:, None, None], self.stripes, stripes))
+    def guiding_on(self, measured: NDArray[np.bool_] | None, stripes: Array) -> "Estimate":
+        """The same, with stripes that go on from those (blocks, 7, 3) of the last estimate.
+
+        Stripes guide how the next frame's chroma is read, and may be overshot there: what is too red is found too
+        green next, of fine stripes beside a lamp by more than it was. Half of each step lets that die away.
+
+        Args:
+            measured: (blocks,) which blocks were measured, all by default; the others keep their stripes.
+        """
+        guide = stripes + _HALFWAY * (self.stripes - stripes)
+        if measured is not None:
+            guide = np.where(measured[:, None, None], guide, stripes)
+        return replace(self, stripes=guide)
 
 
 class LightingEstimator:

@@ -297,3 +297,29 @@ def test_a_frame_of_nonsense_does_not_spoil_the_next(estimator, blank, lit, rand
         nuisance = estimate.nuisance
         assert np.all(np.isfinite(estimate.lighting.covariance))
     assert relative_error(settled(estimator, good, 4), truth).max() < 0.01
+
+
+@pytest.fixture(scope="module")
+def found(estimator, blank):
+    return estimator.estimate(blank(), 0.0)
+
+
+@pytest.mark.parametrize("overshoot", [0.0, 1.0, 1.5, 2.5])
+def test_a_guide_that_is_overshot_settles(found, overshoot):
+    """Each frame's stripes stray from the true ones to the other side of where their guide did, and further."""
+    true, generator = found.stripes, np.random.default_rng(5)
+    guide = true + generator.normal(scale=0.1, size=true.shape)
+    began = np.abs(guide - true).max()
+    for _ in range(30):
+        guide = replace(found, stripes=true - overshoot * (guide - true)).guiding_on(None, guide).stripes
+    assert np.abs(guide - true).max() < 1e-2 * began
+
+
+def test_only_blocks_that_were_measured_change_what_guides(found):
+    generator = np.random.default_rng(6)
+    last, measured = generator.normal(size=found.stripes.shape), generator.random(len(found.stripes)) < 0.5
+    guide = found.guiding_on(measured, last).stripes
+    np.testing.assert_array_equal(guide[~measured], last[~measured])
+    between = (guide - last)[measured] / (found.stripes - last)[measured]
+    assert np.all((between > 0.0) & (between < 1.0))
+    np.testing.assert_array_equal(found.guiding_on(measured, found.stripes).stripes, found.stripes)
