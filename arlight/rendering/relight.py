@@ -116,6 +116,7 @@ class Relighter:
         self._refinement = refined(self.mesh) if refines else None
         drawn = self.mesh if self._refinement is None else self._refinement.mesh
         self._vertices = np.ascontiguousarray(drawn.vertices_mm, np.float32)
+        self._native = self._native_drawer() if s.renderer == "native" else None
         self._opened: ObjectDrawer | None = None
         self._known: NDArray[np.int64] | None = None
 
@@ -171,8 +172,9 @@ class Relighter:
     def appearance(self) -> Appearance:
         """How much of the picture each coefficient of the light makes; worked out when first asked for."""
         s = self.settings
-        rows = gloss_rows(self._reconstruction, s.roughness)
-        return appearance(self.mesh, self.transfer, rows, s.roughness, s.normal_reflectance, self._frequencies)
+        return appearance(
+            self.mesh, self.transfer, self._gloss_rows, s.roughness, s.normal_reflectance, self._frequencies
+        )
 
     @cached_property
     def need(self) -> Need:
@@ -192,27 +194,34 @@ class Relighter:
         return None if region is None else View(camera_from_probe, projected, region)
 
     def _draw(self, view: View, packed: NDArray[np.float32], supersampling: int | None = None) -> NDArray[np.float32]:
-        if self._opened is None:
-            self._opened = self._open()
-        self._opened.supersampling = supersampling or self.settings.supersampling
-        if not isinstance(self._opened, RasterRenderer) and len(packed) < len(self._reconstruction.independent):
+        drawer: ObjectDrawer | None = self._native or self._opened
+        if drawer is None:
+            drawer = self._opened = self._open()
+        drawer.supersampling = supersampling or self.settings.supersampling
+        if self._native is None and len(packed) < len(self._reconstruction.independent):
             packed = self._reconstruction.completed(packed).astype(np.float32)
-        return self._opened.draw(view, packed)
+        return drawer.draw(view, packed)
+
+    @cached_property
+    def _gloss_rows(self) -> NDArray[np.float32]:
+        return gloss_rows(self._reconstruction, self.settings.roughness)
+
+    def _native_drawer(self) -> RasterRenderer:
+        s = self.settings
+        material = (self._gloss_rows, s.roughness, s.normal_reflectance, s.supersampling)
+        return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent, self._refinement)
 
     def _open(self) -> ObjectDrawer:
         s = self.settings
-        # the others here, because what they need takes long to load
+        # imported here, because what they need takes long to load
         if s.renderer == "pyrender":
             from arlight.rendering.pyrender_drawer import PyrenderDrawer
 
             return PyrenderDrawer(self.mesh, self._reconstruction, self._camera, s.roughness)
-        rows = gloss_rows(self._reconstruction, s.roughness)
-        material = (rows, s.roughness, s.normal_reflectance, s.supersampling)
-        if s.renderer == "moderngl":
-            from arlight.rendering.draw import ObjectRenderer
+        from arlight.rendering.draw import ObjectRenderer
 
-            return ObjectRenderer(self.mesh, self.transfer, *material)
-        return RasterRenderer(self.mesh, self.transfer, *material, self._reconstruction.independent, self._refinement)
+        material = (self._gloss_rows, s.roughness, s.normal_reflectance, s.supersampling)
+        return ObjectRenderer(self.mesh, self.transfer, *material)
 
     def _fitted(self, mesh: Mesh) -> Mesh:
         """The mesh, simplified if there are more triangles than are to be drawn."""

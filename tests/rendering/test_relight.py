@@ -176,6 +176,15 @@ def test_made_in_one_thread_and_used_in_another(probe, camera, pose, lighting_of
     assert np.allclose(results[0][1], here[1], atol=1e-6)
 
 
+def test_what_belongs_to_no_thread_is_made_once(probe, camera, pose, lighting_of, environment, monkeypatch):
+    relighter = Relighter(default_object(), probe, camera, QUICK)
+    monkeypatch.setattr("arlight.rendering.relight.gloss_rows", lambda *_: pytest.fail("prepared again"))
+    before = relighter.draw_object(pose, lighting_of(environment))
+    relighter.release()
+    after = relighter.draw_object(pose, lighting_of(environment))
+    assert np.array_equal(before[1], after[1])
+
+
 def test_a_grey_frame_gets_a_coloured_object(relighter, pose, lighting_of, environment):
     colour = frame_of()
     from arlight.video.pixel_format import PixelFormat
