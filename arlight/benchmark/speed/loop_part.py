@@ -79,17 +79,14 @@ def _run(
     stages_ms: dict[str, list[float]],
 ) -> float:
     """Wall time of a run over a clip [s]; that of every frame's stages is added to those known [ms]."""
-    with VideoReader(path) as reader:
-        begun = perf_counter()
-        with Sinks() as sinks:
-            sinks.video = VideoWriter(
-                folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.encoder_preset
-            )
-            with FrameLoop(reader, pipeline, sinks) as records:
-                for record in records:
-                    for stage, ms in record.timings_ms.items():
-                        stages_ms.setdefault(stage, []).append(ms)
-        return perf_counter() - begun
+    begun = perf_counter()
+    with VideoReader(path) as reader, Sinks() as sinks:
+        sinks.video = VideoWriter(folder / "relit.mp4", like=reader, crf=encoding.crf, preset=encoding.encoder_preset)
+        with FrameLoop(reader, pipeline, sinks) as records:
+            for record in records:
+                for stage, ms in record.timings_ms.items():
+                    stages_ms.setdefault(stage, []).append(ms)
+    return perf_counter() - begun
 
 
 def _transcode(path: Path, encoding: EncodingSettings, target: Path) -> float:
