@@ -190,7 +190,7 @@ class LightingTracker:
         blocks = self._block_order <= order if order < self._highest else None
         last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
-            stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance(blur_px**2))
+            stripes, nuisance = (last.stripes, last.nuisance) if last else (None, Nuisance.guess(blur_px**2))
             means = self._meter.measure(
                 frame, pose.camera_from_probe, blur_px, stripes, blocks, self.effort.samples_per_block
             )

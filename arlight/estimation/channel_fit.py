@@ -27,7 +27,8 @@ _COARSE = 2 / 3
 reflection in red and blue strays from green's pattern."""
 _LANES = 4
 _NUISANCES, _WIDE, _FREQUENCY = 5, 8, 8
-_native = library(__file__, "channel_fit")
+_native = library(__file__, "sheet_estimate")
+_native.recall.argtypes = (ctypes.c_void_p,) * 3
 _native.fit_channel.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 _PLANES = ctypes.c_int64.in_dll(_native, "channel_planes").value
 
@@ -153,21 +154,19 @@ class SheetFit:
         }  # fmt: skip
         self.native.hold({name: np.zeros(shape) for name, shape in shapes.items()})
 
-    def begin(self, count: int, nuisance: Nuisance) -> int:
+    def begin(self, count: int) -> int:
         """Prepare for a frame with the first `count` frequencies; returns how many blocks they have."""
         unknown = 2 * count - 1
         self.packed, self.covariance = np.empty((CHANNELS, unknown)), np.empty((CHANNELS, unknown, unknown))
         native = self.native
         native.frequencies, native.wide = count - 1, _whole(unknown)
         native.packed, native.covariance = address(self.packed, np.float64), address(self.covariance, np.float64)
-        self.nuisances[GREEN] = nuisance.values
-        self.scales[:] = nuisance.error_scale
-        self.spreads[0], self.spreads[2] = nuisance.color_spread
         return int(self._first[count])
 
-    def forget(self) -> None:
-        """Know nothing of green's lamps and weights, as in a first frame."""
-        _native.forget(self._pointer)
+    def recall(self, nuisance: Nuisance) -> None:
+        """Start from what another frame told: from no lamps and weights of green where it told none."""
+        blocks = None if nuisance.blocks is None else address(nuisance.blocks, np.float64)
+        _native.recall(self._pointer, address(nuisance.numbers, np.float64), blocks)
 
     def fit(self, channel: int, passes: int = 1, *, settle: bool = False) -> FitResult:
         """Fit one channel; green starts from the lamps, weights and nuisance at hand, red and blue from green's.

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.estimation.channel_fit import GREEN, FitResult, SheetFit
+from arlight.estimation.channel_fit import SheetFit
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.measured_blocks import CHANNELS, MeasuredBlocks
-from arlight.estimation.nuisance import Nuisance
+from arlight.estimation.nuisance import NUMBERS, Nuisance
 from arlight.estimation.reflection import reflection_basis
 from arlight.estimation.resampling import Resampling, resampling
 from arlight.estimation.response import BlockResponse
 from arlight.estimation.row_noise import MEAN_MODEL, WHITE_MODEL
 from arlight.fourier import orders_up_to, unpack_real
-from arlight.native import address, library
+from arlight.native import Workspace, address, library
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Probe
 from arlight.tracking.block_layout import field_blocks
@@ -30,11 +30,20 @@ Array = NDArray[np.float64]
 ITERATIONS = 2
 """How often a frame's weights and solution are refined after the first frame: with less, a lamp that comes into a block
 spoils the frame; more changes nothing."""
-_FIRST_ITERATIONS = 4
 _HALFWAY = 0.5
 """Of the last stripes and the new ones, what guides the next frame; overshoots of up to three times die away."""
-_native = library(__file__, "guide", keeps_lock=True)
-_native.guide.argtypes = (ctypes.c_void_p,) * 5
+_native = library(__file__, "sheet_estimate")
+_native.estimate_sheet.argtypes = (*((ctypes.c_void_p,) * 4), ctypes.c_int64, *((ctypes.c_void_p,) * 6))
+
+
+class _SheetEstimate(Workspace):
+    """As in sheet_estimate.c."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("measured", "response", "fit")),
+        *((name, ctypes.c_int64) for name in ("all", "passes")),
+        *((name, ctypes.c_double) for name in ("chi2", "unexplained")),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +97,7 @@ class LightingEstimator:
         assembly = assembly or Assembly()
         blocks = field_blocks(probe)
         kinds = [block.kind for block in blocks]
-        self._frequencies, self._iterations, self._count = probe.frequencies, iterations, len(blocks)
+        self._frequencies, self._count = probe.frequencies, len(blocks)
         self._response = BlockResponse(probe, assembly, bounces=bounces)
         self._measured = MeasuredBlocks(
             kinds,
@@ -105,6 +114,9 @@ class LightingEstimator:
             np.where(np.array(kinds) == "clear_white", WHITE_MODEL, MEAN_MODEL),
             probe.paper_reflectance * probe.film_transmittance**2 / np.pi,
         )
+        parts = (ctypes.addressof(part.native) for part in (self._measured, self._response, self._fit))
+        self._shared = _SheetEstimate(*parts, len(blocks), iterations)
+        self._at = ctypes.byref(self._shared)
         self._counts: dict[int, int] = {}
         self._resampling = {len(probe.frequencies): resampling(probe, assembly)}
         self._sheet = probe, assembly
@@ -127,14 +139,23 @@ class LightingEstimator:
         Raises:
             ProbeError: the sheet does not measure the order.
         """
-        start, fit = nuisance or Nuisance(), self._fit
         count = len(self._frequencies) if order is None else self._count_up_to(order)
-        blocks = fit.begin(count, start)
-        self._measured.gather(means, blocks)
-        green = self._fit_green(start, blocks)
-        chi2 = (fit.fit(0).chi2 + green.chi2 + fit.fit(2).chi2) / CHANNELS
-        stripes, reflection = self._guide()
-        return Estimate(self._lighting(count, time_s, chi2), stripes, reflection, self._learnt(), green.unexplained)
+        start, unknown = nuisance or Nuisance.guess(), 2 * count - 1
+        known = unknown if start.shape is None else len(start.shape)
+        self._response.expect(known)
+        kept = self._measured.point(means, self._fit.begin(count))
+        coefficients = np.empty((count, CHANNELS), complex)
+        stripes, reflection = np.empty((self._count, ROWS, CHANNELS)), np.empty((self._count, CHANNELS))
+        told = Nuisance(np.empty(NUMBERS), np.empty(unknown), np.empty((2, len(self._response.cosine))))
+        sensible = _native.estimate_sheet(
+            self._at, *_places(start), known, *_places(told), address(coefficients, np.complex128),
+            address(stripes, np.float64), address(reflection, np.float64),
+        )  # fmt: skip
+        del kept
+        lighting = self._lighting(coefficients, time_s)
+        # where the frame made no sense the next one starts anew
+        nuisance = told if sensible else Nuisance.guess()
+        return Estimate(lighting, stripes, reflection, nuisance, self._shared.unexplained)
 
     def _count_up_to(self, order: int) -> int:
         """How many frequencies have an order of at most `order`."""
@@ -142,55 +163,13 @@ class LightingEstimator:
             self._counts[order] = int(np.sum(orders_up_to(self._frequencies, order)))
         return self._counts[order]
 
-    def _fit_green(self, start: Nuisance, blocks: int) -> FitResult:
-        """Fit green from where the last frame left off; a first frame settles, the light's shape among the rest."""
-        fit = self._fit
-        if start.blocks is None:
-            fit.forget()
-        else:
-            np.multiply(start.blocks[0], self._measured.white[GREEN] ** 2, out=fit.lamps[GREEN])
-            fit.weights[GREEN] = start.blocks[1]
-        self._response.fill(blocks, start.shape)
-        if start.shape is not None:
-            return fit.fit(GREEN, self._iterations)
-        fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
-        self._response.fill(blocks, _shape(fit.packed[GREEN]))
-        return fit.fit(GREEN, _FIRST_ITERATIONS, settle=True)
-
-    def _guide(self) -> tuple[Array, Array]:
-        """Stripes (blocks, 7, 3) to expect next, and reflection (blocks, 3); 0 in blocks that were not estimated."""
-        stripes, reflection = np.zeros((self._count, ROWS, CHANNELS)), np.zeros((self._count, CHANNELS))
-        _native.guide(
-            ctypes.addressof(self._measured.native),
-            self._fit.native.predicted,
-            self._fit.native.reflection,
-            address(stripes, np.float64),
-            address(reflection, np.float64),
-        )
-        return stripes, reflection
-
-    def _learnt(self) -> Nuisance:
-        """Where the next frame starts: anew where this one made no sense."""
-        fit = self._fit
-        if not np.isfinite(fit.packed).all():
-            return Nuisance()
-        blocks = np.empty((2, len(fit.lamps[GREEN])))
-        np.multiply(fit.lamps[GREEN], 1.0 / self._measured.white[GREEN] ** 2, out=blocks[0])
-        blocks[1] = fit.weights[GREEN]
-        return Nuisance.of(
-            fit.nuisances[GREEN],
-            color_spread=(fit.spreads.item(0), fit.spreads.item(2)),
-            error_scale=tuple(map(tuple, fit.scales.tolist())),
-            shape=_shape(fit.packed[GREEN]),
-            blocks=blocks,
-        )
-
-    def _lighting(self, count: int, time_s: float, chi2: float) -> Lighting:
-        packed, covariance = self._fit.packed, self._fit.covariance
+    def _lighting(self, coefficients: NDArray[np.complex128], time_s: float) -> Lighting:
+        count, covariance = len(coefficients), self._fit.covariance
         resampled = self._resampled(count)
         if resampled is not None:
-            packed, covariance = resampled.apply(packed, covariance)
-        return Lighting(self._frequencies[:count], unpack_real(packed.T), covariance, time_s, chi2)
+            packed, covariance = resampled.apply(self._fit.packed, covariance)
+            coefficients = unpack_real(packed.T)
+        return Lighting(self._frequencies[:count], coefficients, covariance, time_s, self._shared.chi2)
 
     def _resampled(self, count: int) -> Resampling | None:
         """What makes whole frequencies of the first `count` measured ones."""
@@ -199,8 +178,7 @@ class LightingEstimator:
         return self._resampling[count]
 
 
-def _shape(green: Array) -> Array:
-    """Real-packed coefficients relative to L~_0; light is not negative, so none can be larger."""
-    shape = green * (1.0 / max(float(green[0]), 1e-6))
-    np.minimum(shape, 1.0, out=shape)
-    return np.maximum(shape, -1.0, out=shape)
+def _places(nuisance: Nuisance) -> tuple[int | None, ...]:
+    """Where its numbers, its blocks and its shape lie in memory."""
+    arrays = nuisance.numbers, nuisance.blocks, nuisance.shape
+    return tuple(None if array is None else address(array, np.float64) for array in arrays)

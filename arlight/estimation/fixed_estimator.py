@@ -131,7 +131,7 @@ class FixedEstimator:
         if order is not None:
             lighting = lighting.truncated(order)
         reflection = self._reference.reflection(means)
-        return Estimate(lighting, means.values.copy(), reflection, nuisance or Nuisance(), float("nan"))
+        return Estimate(lighting, means.values.copy(), reflection, nuisance or Nuisance.guess(), float("nan"))
 
 
 class ReferenceRegions:

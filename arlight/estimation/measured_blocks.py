@@ -25,7 +25,7 @@ _PLANES = {
     "resolved": 1, "seen": 1, "trust": 1, "cycles": 2, "left": HARMONICS, "left_log": HARMONICS,
     "fineness": HARMONICS, "face": 1, "scratch": 1,
 }  # fmt: skip
-_native = library(__file__, "measured_blocks", keeps_lock=True)
+_native = library(__file__, "sheet_estimate")
 
 
 class _MeasuredBlocks(Workspace):
@@ -72,6 +72,12 @@ class MeasuredBlocks:
 
     def gather(self, means: BlockMeans, count: int) -> None:
         """Fill the planes with the first `count` blocks of the sequence."""
+        kept = self.point(means, count)
+        _native.gather(ctypes.byref(self.native))
+        del kept
+
+    def point(self, means: BlockMeans, count: int) -> list[NDArray[np.generic]]:
+        """Tell the compiled code where the first `count` blocks' measurements lie; to be kept until it is done."""
         kept = []
         for name in _MEASURED:
             kind = _TYPES.get(name, np.float64)
@@ -79,7 +85,7 @@ class MeasuredBlocks:
             kept.append(array)
             setattr(self.native, name, address(array, kind))
         self.native.blocks = count
-        _native.gather(ctypes.byref(self.native))
+        return kept
 
     @property
     def white(self) -> tuple[float, ...]:

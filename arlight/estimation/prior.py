@@ -14,7 +14,7 @@ COLOR_SPREAD = 0.08
 """The same of the difference between red or blue and green, each relative to its own L~_0."""
 _MEAN_SPREAD = 10.0
 """Standard deviation of L~_0: three times a hemisphere of full-scale radiance [radiance * sr]."""
-_native = library(__file__, "channel_fit")
+_native = library(__file__, "sheet_estimate")
 _native.color_spread.restype = ctypes.c_double
 _native.color_spread.argtypes = (
     ctypes.c_int64, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double,

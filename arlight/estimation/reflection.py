@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _LENGTH_MM = 40.0
 """Correlation length: about 8 degrees of mirrored environment at arm's length [mm]."""
 _KEPT_VARIANCE = 3e-3
-_native = library(__file__, "measured_blocks")
+_native = library(__file__, "sheet_estimate")
 _native.amplitude_of_field.restype = ctypes.c_double
 _native.amplitude_of_field.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_double)
 

@@ -16,7 +16,7 @@ from arlight.estimation.radiance_prior import predicted_sky, received_operator, 
 from arlight.estimation.resampling import measured_frequencies
 from arlight.estimation.slab_echo import Echo, uniform_light
 from arlight.estimation.stack import PaperLight, paper_light
-from arlight.native import Workspace, library
+from arlight.native import Workspace, address, library
 from arlight.probe.assembly import Assembly
 from arlight.probe.design import Block, Probe
 from arlight.tracking.block_layout import field_blocks
@@ -30,17 +30,19 @@ _LANES = 8
 _PARTS = 2 * STACK_HARMONICS + 1
 _SILENT = 1e-9
 """Light that goes back and forth, relative to the most, below which a harmonic of it counts as nothing."""
-_native = library(__file__, "response", keeps_lock=True)
+_native = library(__file__, "sheet_estimate")
+_native.respond.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 
 
 class _Response(Workspace):
-    """As in response.c."""
+    """As in response.h."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("blocks", "stride", "columns", "unknown", "kinds", "parts", "folded")),
+        *((name, ctypes.c_int64) for name in ("blocks", "stride", "columns", "unknown", "kinds", "parts")),
+        *((name, ctypes.c_int64) for name in ("folded", "whole")),
         ("index", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in ("film", "radiosity", "gathered", "echo", "kind", "overtone")),
-        *((name, ctypes.c_void_p) for name in ("passed_twice", "shape", "phasor", "cosine")),
+        *((name, ctypes.c_void_p) for name in ("passed_twice", "usual", "beyond", "shape", "phasor", "cosine")),
         *((name, ctypes.c_void_p) for name in ("echoed", "rows", "mirror")),
     )
 
@@ -80,24 +82,19 @@ class BlockResponse:
         self.places, known = _places(probe, blocks, light.radiosity.shape[2])
         self.sequence = np.argsort(self.places[:, 1], kind="stable")
         self._count, unknown = len(blocks), 2 * len(probe.frequencies) - 1
-        self._shape = np.zeros(-(-unknown // _LANES) * _LANES)
-        if light.echo is not None:
-            self._usual_shape = uniform_light(slab, self._measured)
-        else:
-            self._usual_shape = np.eye(1, unknown)[0]
+        usual = np.eye(1, unknown)[0] if light.echo is None else uniform_light(slab, self._measured)
+        filled = -(-unknown // _LANES) * _LANES
         stride = -(-len(blocks) // _LANES) * _LANES
         self.phasor, self.cosine = np.zeros((2, stride)), np.ones(stride)
         self.rows, self.mirror = np.zeros((self.places.shape[1], ROWS, stride)), np.zeros((ROWS, stride))
-        self._native = _Response(
-            blocks=stride,
-            stride=stride,
-            columns=self.places.shape[1],
-            unknown=len(self._shape),
+        self.native = _Response(
+            blocks=stride, stride=stride, columns=self.places.shape[1], unknown=filled, whole=unknown,
             index=slab.refractive_index,
-        )
-        self._native.hold({
-            "shape": self._shape, "phasor": self.phasor, "cosine": self.cosine, "rows": self.rows,
-            "mirror": self.mirror, "overtone": self._overtone(stride),
+        )  # fmt: skip
+        """What the compiled code is given."""
+        self.native.hold({
+            "usual": np.ascontiguousarray(usual, float), "shape": np.zeros(filled), "phasor": self.phasor,
+            "cosine": self.cosine, "rows": self.rows, "mirror": self.mirror, "overtone": self._overtone(stride),
         })  # fmt: skip
         self._hold(light, known, stride)
 
@@ -112,17 +109,17 @@ class BlockResponse:
         if light.echo is not None:
             kind[: self._count] = light.echo.kind[self.sequence]
             tables["gathered"] = self._hold_echo(light.echo, _real_matrix(light.gathered))
-        self._native.hold({"kind": kind, **{name: self._planes(table, stride) for name, table in tables.items()}})
+        self.native.hold({"kind": kind, **{name: self._planes(table, stride) for name, table in tables.items()}})
 
     def _hold_echo(self, echo: Echo, gathered: Array) -> Array:
         """Keep the echo's irradiance; returns what gathers it (9, parts, blocks), as far as it is not 0."""
         irradiance = np.swapaxes(real_parts(np.swapaxes(echo.irradiance, 1, 2)), 1, 2)
         heard = np.abs(irradiance).max(axis=(0, 2))
         parts = int(np.flatnonzero(heard > _SILENT * heard.max(initial=0.0)).max(initial=-1)) + 1
-        table = np.zeros((len(irradiance), parts, len(self._shape)))
+        table = np.zeros((len(irradiance), parts, self.native.unknown))
         table[:, :, : irradiance.shape[2]] = irradiance[:, :parts]
-        self._native.kinds, self._native.parts = table.shape[:2]
-        self._native.hold({"echo": table, "echoed": np.zeros(table.shape[:2])})
+        self.native.kinds, self.native.parts = table.shape[:2]
+        self.native.hold({"echo": table, "echoed": np.zeros(table.shape[:2])})
         return np.moveaxis(gathered[:, :, :parts], 0, 2)
 
     def _planes(self, table: Array, stride: int) -> Array:
@@ -156,7 +153,7 @@ class BlockResponse:
     def lower_mirror(self, means: BlockMeans) -> Array:
         """Rows (blocks, 7) of the mirror reflection in the glass's lower face, where the upper face's is 1."""
         self._look(means)
-        _native.mirror_rows(ctypes.byref(self._native))
+        _native.mirror_rows(ctypes.byref(self.native))
         return self._natural(self.mirror).T.copy()
 
     def fill(self, count: int, shape: Array | None = None, *, folded: bool = True) -> None:
@@ -167,20 +164,25 @@ class BlockResponse:
             folded: count light of twice a block's frequency with that of L_0, by the shape; of `rows` only the first
                 three columns are filled then.
         """
-        self._shape[: len(self._usual_shape)] = self._usual_shape if shape is None else self._completed(shape)
-        self._native.blocks, self._native.folded = count, folded
-        _native.light_rows(ctypes.byref(self._native))
-        _native.mirror_rows(ctypes.byref(self._native))
+        known = 0 if shape is None else len(shape)
+        self.expect(known)
+        self.native.blocks, self.native.folded = count, folded
+        values = None if shape is None else np.ascontiguousarray(shape, float)
+        at = None if values is None else address(values, np.float64)
+        _native.respond(ctypes.byref(self.native), at, known)
 
-    def _completed(self, shape: Array) -> Array:
-        """Coefficients that were not measured, by the sky that the measured ones predict."""
-        known = len(shape)
-        if known == len(self._usual_shape):
-            return shape
+    def expect(self, known: int) -> None:
+        """Prepare for a light's shape of which so many coefficients are known.
+
+        Those that were not measured are those of the sky that the measured ones predict.
+        """
+        if not 0 < known < self.native.whole:
+            return
         if known not in self._beyond:
             operator = received_operator(self._slab, self._measured, *sky_directions())
-            self._beyond[known] = operator[known:] @ predicted_sky(self._slab, self._measured[: (known + 1) // 2])
-        return np.concatenate([shape, self._beyond[known] @ shape])
+            beyond = operator[known:] @ predicted_sky(self._slab, self._measured[: (known + 1) // 2])
+            self._beyond[known] = np.ascontiguousarray(beyond, float)
+        self.native.beyond = self._beyond[known].ctypes.data
 
     def _look(self, means: BlockMeans) -> None:
         phasor = np.asarray(means.view_phasor)[self.sequence]

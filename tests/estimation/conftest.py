@@ -167,12 +167,12 @@ class Fitted:
 
     def start(self, means, nuisance=None, count=None):
         count = count or len(self.frequencies)
-        self.nuisance = nuisance or Nuisance()
+        self.nuisance = nuisance or Nuisance.guess()
         self.means = means
-        self.used = self.sheet.begin(count, self.nuisance)
+        self.used = self.sheet.begin(count)
         self.blocks.gather(means, self.used)
         self.response.fill(self.used)
-        self.sheet.forget()
+        self.sheet.recall(self.nuisance)
         return self
 
     def planes(self, name, channel=GREEN):

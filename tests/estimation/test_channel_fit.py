@@ -118,7 +118,7 @@ def test_blur_is_found_from_wherever_it_starts(fitted, blank, lit_as_usual, rand
     truth = random_light(7)
     means = lit_as_usual(blank(), truth, blur_variance_px2=blur)
     for start in (0.1, 0.5, 1.2):
-        settled(fitted, means, Nuisance(blur_variance_px2=start), frames=5)
+        settled(fitted, means, Nuisance.guess(blur_variance_px2=start), frames=5)
         assert fitted.sheet.nuisances[GREEN, 0] == pytest.approx(blur, abs=0.03)
         assert error(fitted, truth) < 0.015
 
@@ -172,7 +172,7 @@ def test_paper_that_sticks_to_the_glass_shows_in_the_lower_face(fitted, blank, l
 
 def test_without_blocks_the_prior_and_the_first_guess_are_left(fitted, blank, lit_as_usual, random_light):
     means = lit_as_usual(blank(), random_light(9))
-    found = settled(fitted, replace(means, valid=np.zeros(len(means.valid), bool)), Nuisance(0.7, 0.9))
+    found = settled(fitted, replace(means, valid=np.zeros(len(means.valid), bool)), Nuisance.guess(0.7, 0.9))
     assert np.isnan(found.chi2)
     assert np.isnan(found.unexplained)
     np.testing.assert_allclose(fitted.sheet.packed[GREEN], 0.0, atol=1e-12)

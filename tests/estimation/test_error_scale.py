@@ -44,7 +44,7 @@ def stray(blank, lit, random_light):
 
 
 def settled(estimator, measure, start=(1.0, 1.0), frames=120):
-    nuisance = Nuisance(error_scale=(start,) * 3)
+    nuisance = Nuisance.guess(error_scale=(start,) * 3)
     for frame in range(frames):
         nuisance = estimator.estimate(measure(frame), 0.0, nuisance).nuisance
     return np.array(nuisance.error_scale)

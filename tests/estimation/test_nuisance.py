@@ -2,21 +2,26 @@
 
 import numpy as np
 
-from arlight.estimation.nuisance import Nuisance
+from arlight.estimation.nuisance import NUMBERS, Nuisance
 
 
 def test_values_come_back():
-    values = np.array([0.7, -0.002, 0.9, 0.1, -0.05])
-    shape, blocks = np.array([1.0, 0.2, 0.1]), np.ones((2, 8))
-    nuisance = Nuisance.of(values, (0.05, 0.06), ((1.0, 2.0),) * 3, shape, blocks)
-    np.testing.assert_array_equal(nuisance.values, values)
+    scales = (1.0, 2.0), (0.5, 3.0), (0.1, 0.2)
+    nuisance = Nuisance.guess(0.7, 0.9, (0.05, 0.06), scales, -0.002, (0.1, -0.05))
     assert nuisance.blur_variance_px2 == 0.7
+    assert nuisance.sharpness_px4 == -0.002
+    assert nuisance.lower_face == 0.9
     assert nuisance.shift_px == (0.1, -0.05)
     assert nuisance.color_spread == (0.05, 0.06)
-    assert nuisance.shape is shape
-    assert nuisance.blocks is blocks
+    assert nuisance.error_scale == scales
+    assert nuisance.numbers.shape == (NUMBERS,)
 
 
 def test_a_first_guess_knows_neither_the_light_nor_its_blocks():
-    assert Nuisance().shape is None
-    assert Nuisance().blocks is None
+    assert Nuisance.guess().shape is None
+    assert Nuisance.guess().blocks is None
+
+
+def test_guesses_share_no_memory():
+    one, other = Nuisance.guess(), Nuisance.guess()
+    assert not np.shares_memory(one.numbers, other.numbers)

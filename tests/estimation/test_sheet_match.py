@@ -56,7 +56,7 @@ def test_where_no_stripes_are_resolved_nothing_is_said(estimator, means, blank, 
     small = blank()
     small = replace(small, cycles_per_px=3.0 * small.cycles_per_px)
     blurred = lit(small, random_light(0), blur_variance_px2=6.0)
-    assert np.isnan(unexplained(estimator, blurred, Nuisance(6.0)))
+    assert np.isnan(unexplained(estimator, blurred, Nuisance.guess(6.0)))
 
 
 def test_a_few_blocks_are_not_enough(estimator, means):

@@ -239,12 +239,12 @@ def begun(fitted, blank, lit_as_usual, random_light):
         camera_mm = np.random.default_rng(seed).uniform([-200, -250, 150], [200, 50, 350])
         means = lit_as_usual(blank(camera_mm, sigma=0.004), random_light(seed), mirrored=0.04, noise_seed=seed)
         scales = ((0.7, 1.6), (1.3, 0.6), (2.0, 1.1))
-        nuisance = Nuisance(0.3, 0.8, (0.06, 0.1), scales, 0.0005, (0.02, -0.05))
+        nuisance = Nuisance.guess(0.3, 0.8, (0.06, 0.1), scales, 0.0005, (0.02, -0.05))
         fitted.start(awkward(means, seed), nuisance)
         weight = np.random.default_rng(seed).uniform(0.3, 1.2, len(means.valid))
         fitted.sheet.weights[GREEN, : len(weight)] = weight[fitted.response.sequence]
         deviation = prior_stddev(fitted.frequencies, fitted.blocks.white[GREEN] / fitted.white_per_irradiance)
-        start = np.array(nuisance.values)
+        start = nuisance.numbers[:5].copy()
         lamp = fitted.planes("lamps")
         return WideFit(fitted, GREEN, start, lamp, weight, np.zeros_like(deviation), deviation).found
 

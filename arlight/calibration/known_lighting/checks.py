@@ -111,7 +111,7 @@ def lighting_error(
     truth = unpack_real(light.packed(probe.frequencies) * exposure)
     own = [replace(frame, light=0) for frame in seen]
     stripes = None
-    nuisances = [Nuisance(frame.pose.blur_px**2) for frame in own]
+    nuisances = [Nuisance.guess(frame.pose.blur_px**2) for frame in own]
     for _ in range(2):
         views = measure(own, [light], probe, camera, assembly, stripes)
         estimates = [

@@ -88,7 +88,7 @@ class ViewMeter:
         """Measure one view by itself."""
         pose, time_s = seen.pose.camera_from_probe, seen.frame.time_s
         assert pose is not None
-        nuisance = Nuisance(seen.pose.blur_px**2)
+        nuisance = Nuisance.guess(seen.pose.blur_px**2)
         means = self._meter.measure(seen.frame, pose, seen.pose.blur_px)
         for _ in range(_REPEATS):
             estimate = self._estimator.estimate(means, time_s, nuisance)

@@ -1,13 +1,14 @@
 /* Rows that blocks show for unit light, from one point of view: products of short Fourier series, block by block.
 
 A real function has harmonics 0 to 4 as a mean and four complex numbers; those of -l are the conjugates. */
-#include "lanes.h"
+#ifndef ARLIGHT_RESPONSE_H
+#define ARLIGHT_RESPONSE_H
+
+#include "measured_blocks.h"
 #include "reflection.h"
 
 #define TOP 4                     /* highest harmonic of a layer that is followed */
 #define PARTS (2 * TOP + 1)       /* real numbers of a series: mean, then real and imaginary parts */
-#define SEEN 3                    /* highest harmonic of the rows */
-#define ROWS (2 * SEEN + 1)
 
 typedef struct {
     int64_t blocks;             /* that are asked for, the first ones; planes are filled to whole lanes */
@@ -17,6 +18,7 @@ typedef struct {
     int64_t kinds;              /* of blocks that are alike to light going back and forth in the glass; 0 without it */
     int64_t parts;              /* of such light's series that are not 0 */
     int64_t folded;             /* whether light of twice the frequency is counted with that of L_0, by the shape */
+    int64_t whole;              /* real coefficients of the light, 2k - 1 */
     double index;               /* of refraction */
     const double *film;         /* (9, stride) series of the transmittance */
     const double *radiosity;    /* (columns, 9, stride) series of the paper's radiosity for unit coefficients */
@@ -25,7 +27,9 @@ typedef struct {
     const int32_t *kind;        /* (stride) of each block */
     const int32_t *overtone;    /* (stride) place of Re L_2n; 0 for none */
     const double *passed_twice; /* (stride) share of the light that a second crossing of the film leaves */
-    const double *shape;        /* (unknown) coefficients relative to L_0, as far as known */
+    const double *usual;        /* (whole) coefficients relative to L_0 as long as none are known */
+    const double *beyond;       /* (whole - known, known) what known coefficients predict of the others */
+    double *shape;              /* (unknown) coefficients relative to L_0, as far as known */
     const double *phasor;       /* (2, stride) mean of exp(-i b) over the view */
     const double *cosine;       /* (stride) of the angle between viewer and normal */
     double *echoed;             /* (kinds, parts) irradiance for the shape */
@@ -95,7 +99,7 @@ INLINE void write_product(const Series *f, const Series *q, lanes factor, double
         mean += f->real[l] * q->real[l] + f->imaginary[l] * q->imaginary[l];
     factor *= 2.0;
     store(to, mean * factor);
-    for (int m = 1; m <= SEEN; m++) {
+    for (int m = 1; m <= HARMONICS; m++) {
         lanes real = f->real[m] * q->mean + f->mean * q->real[m];
         lanes imaginary = f->imaginary[m] * q->mean + f->mean * q->imaginary[m];
         for (int l = 1; l < m; l++) {
@@ -113,7 +117,6 @@ INLINE void write_product(const Series *f, const Series *q, lanes factor, double
         store(to + 2 * m * stride, -imaginary * factor);
     }
 }
-
 
 /* Radiosity for L_0 = 1, with what the rest of the light's shape adds to it. */
 INLINE Series lit(const Response *r, int64_t block)
@@ -155,7 +158,7 @@ static HOT void echo_of_shape(const Response *r)
 }
 
 /* Fills `rows`. */
-EXPORT HOT void light_rows(const Response *r)
+static HOT void light_rows(const Response *r)
 {
     echo_of_shape(r);
     int64_t columns = r->folded ? 3 : r->columns;
@@ -184,3 +187,24 @@ EXPORT HOT void mirror_rows(const Response *r)
         write_product(&film, &image, passed * passed, r->mirror + b, r->stride);
     }
 }
+
+/* Fills `shape` from its first `known` coefficients; NULL for those of usual light. */
+static void expect_shape(const Response *r, const double *shape, int64_t known)
+{
+    for (int64_t i = 0; i < r->whole; i++) {
+        double value = 0.0;
+        for (int64_t k = 0; shape && i >= known && k < known; k++)
+            value += r->beyond[(i - known) * known + k] * shape[k];
+        r->shape[i] = !shape ? r->usual[i] : i < known ? shape[i] : value;
+    }
+}
+
+/* Fills `rows` and `mirror` for light whose first `known` coefficients relative to L_0 are `shape`, NULL for usual. */
+EXPORT void respond(const Response *r, const double *shape, int64_t known)
+{
+    expect_shape(r, shape, known);
+    light_rows(r);
+    mirror_rows(r);
+}
+
+#endif

@@ -1,4 +1,7 @@
 /* What a fit hands on, block by block: the stripes to expect in the next frame, and what the film mirrors. */
+#ifndef ARLIGHT_GUIDE_H
+#define ARLIGHT_GUIDE_H
+
 #include "measured_blocks.h"
 
 #define FAINT_STRIPES 0.01 /* of white; fainter ones are taken to have its colour */
@@ -23,8 +26,8 @@ INLINE void guide_block(const double *predicted, int64_t stride, const double *w
 }
 
 /* Writes stripes (blocks, 7, 3) and reflection (blocks, 3) in the sheet's own order; blocks that were not used stay. */
-EXPORT HOT void guide(const MeasuredBlocks *m, const double *predicted, const double *mirrored, double *stripes,
-                  double *reflection)
+static HOT void guide(const MeasuredBlocks *m, const double *predicted, const double *mirrored, double *stripes,
+                      double *reflection)
 {
     for (int64_t j = 0; j < m->blocks; j++) {
         int64_t i = m->sequence[j];
@@ -33,3 +36,5 @@ EXPORT HOT void guide(const MeasuredBlocks *m, const double *predicted, const do
             reflection[i * CHANNELS + c] = mirrored[c * m->stride + j];
     }
 }
+
+#endif

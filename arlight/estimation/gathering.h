@@ -1,4 +1,7 @@
 /* Sorts a frame's measurements into planes, and reads off them how bright white is and how much the film mirrors. */
+#ifndef ARLIGHT_GATHERING_H
+#define ARLIGHT_GATHERING_H
+
 #include "measured_blocks.h"
 #include "quantile.h"
 #include "reflection.h"
@@ -153,3 +156,5 @@ EXPORT double amplitude_of_field(double *observed, int64_t n, double floor)
 {
     return field_amplitude(observed, n, floor);
 }
+
+#endif

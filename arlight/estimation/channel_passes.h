@@ -1,4 +1,7 @@
 /* Robust weighted least squares of one colour channel: weights, blur and solution are refined together. */
+#ifndef ARLIGHT_CHANNEL_PASSES_H
+#define ARLIGHT_CHANNEL_PASSES_H
+
 #include "channel_fit.h"
 #include "error_scale.h"
 #include "sheet_match.h"
@@ -42,8 +45,8 @@ static void turn_to(ChannelFit *f, int64_t channel)
     }
 }
 
-/* Lamps and weights of green in a frame that has no predecessor. */
-EXPORT void forget(ChannelFit *f)
+/* Lamps and weights of green where nothing is known of them. */
+static void forget(ChannelFit *f)
 {
     turn_to(f, GREEN);
     const double white = white_of(f), wide = FIRST_SPARKLE * FIRST_SPARKLE * white * white;
@@ -104,3 +107,5 @@ EXPORT void fit_channel(ChannelFit *f, int64_t channel, int64_t passes, int64_t 
         for (int k = 0; k < 2; k++)
             f->scale[k] = fmax(f->scale[k], 1.0);
 }
+
+#endif
