@@ -1,82 +1,85 @@
-/* Cholesky factors of small symmetric matrices in single precision, rows in whole vector registers. */
+/* A symmetric equation in single precision, by Cholesky's factor, rows in whole vector registers. */
 #ifndef ARLIGHT_CHOLESKY_H
 #define ARLIGHT_CHOLESKY_H
 
 #include "native.h"
 
-enum { LANES = 16, PANEL = 4 }; /* floats of a block; rows that are eliminated together */
+enum { WIDE = 16, PANEL = 4 }; /* floats of a vector; rows that are eliminated together */
 
-/* Length of a row [floats], and number of rows: whole blocks. What lies beyond n is the unit matrix. */
+typedef float wide __attribute__((vector_size(64), aligned(4), may_alias));
+
+/* Length of a row [floats] of n unknowns and the right side, in whole vectors. */
 static inline int row_length(int n)
 {
-    return (n + LANES - 1) / LANES * LANES;
+    return (n + WIDE) / WIDE * WIDE;
 }
 
-/* x -= factors * rows (PANEL of them) from the block of place `first` on. */
-static inline void subtract_panel(int first, int stride, const float *factors, const float *restrict rows,
-                                  float *restrict x)
+/* Takes off some rows from k on, from their diagonal on, what the rows above explain of them. */
+INLINE void reduce_panel(int k, int rows, int stride, float *matrix)
 {
-    float a = factors[0], b = factors[stride], c = factors[2 * stride], d = factors[3 * stride];
-    for (int block = first / LANES * LANES; block < stride; block += LANES)
-        for (int l = block; l < block + LANES; l++)
-            x[l] -= a * rows[l] + b * rows[stride + l] + c * rows[2 * stride + l] + d * rows[3 * stride + l];
+    float *panel = matrix + k * stride;
+    for (int j = k / WIDE * WIDE; j < stride; j += WIDE) {
+        wide sum[PANEL] = {{0.0f}};
+        for (const float *row = matrix; row < panel; row += stride)
+            for (int p = 0; p < PANEL; p++)
+                sum[p] += row[k + p] * *(const wide *)(row + j);
+        for (int p = 0; p < rows; p++)
+            *(wide *)(panel + p * stride + j) -= sum[p];
+    }
 }
 
-/* x -= factor * y from the block of place `first` on. */
-static inline void subtract(int first, int stride, float factor, const float *restrict y, float *restrict x)
-{
-    for (int block = first / LANES * LANES; block < stride; block += LANES)
-        for (int l = block; l < block + LANES; l++)
-            x[l] -= factor * y[l];
-}
-
-/* Replaces the upper triangle of a matrix by R with R'R the matrix, the diagonal by its reciprocal; what lies left of
-   it is cleared within its block. Returns 0 where the matrix is not positive definite. */
-static HOT int factorise(int n, float *restrict matrix)
+/* Replaces the first n rows of (matrix | right side), of which all from the diagonal on counts, by (R | y) with R'R the
+   matrix and R'y the right side, the diagonal by its reciprocal. What stands left of the diagonal in its vector is
+   lost, and has to be finite. Returns 0 where the matrix is not positive definite. */
+static HOT int factorise(int n, float *matrix)
 {
     int stride = row_length(n);
     for (int k = 0; k < n; k += PANEL) {
-        float *panel = matrix + k * stride;
-        for (int p = k; p < k + PANEL; p++) {
-            float *restrict row = matrix + p * stride;
-            for (int q = k; q < p; q++)
-                subtract(k, stride, matrix[q * stride + p], matrix + q * stride, row);
+        int rows = n - k < PANEL ? n - k : PANEL;
+        reduce_panel(k, rows, stride, matrix);
+        for (int p = k; p < k + rows; p++) {
+            float *row = matrix + p * stride;
+            for (int q = k; q < p; q++) {
+                const float *above = matrix + q * stride;
+                float factor = above[p];
+                for (int j = k / WIDE * WIDE; j < stride; j += WIDE)
+                    *(wide *)(row + j) -= factor * *(const wide *)(above + j);
+            }
             if (!(row[p] > 1e-6f))
                 return 0;
             float reciprocal = 1.0f / sqrtf(row[p]);
-            for (int j = p / LANES * LANES; j < stride; j++)
-                row[j] = j > p ? row[j] * reciprocal : 0.0f;
-            /* stands here while the panel's rows are subtracted from one another and from those below */
+            for (int j = k / WIDE * WIDE; j < stride; j += WIDE)
+                *(wide *)(row + j) *= reciprocal;
             row[p] = reciprocal;
         }
-        for (int i = k + PANEL; i < n; i++)
-            subtract_panel(i, stride, panel + i, panel, matrix + i * stride);
     }
     return 1;
 }
 
-/* Solves R'R x = side for several right sides (many, stride), in place; `scratch` is as large. */
-static HOT void solve(int n, const float *restrict factor, int many, float *restrict sides, float *restrict scratch)
+/* Solves R x = y of what `factorise` leaves; x has room for a row. */
+static HOT void substitute(int n, const float *matrix, float *x)
 {
     int stride = row_length(n);
-    for (int k = 0; k < n; k++) {
-        const float *restrict row = factor + k * stride;
-        for (int m = 0; m < many; m++) {
-            float solved = sides[m * stride + k] * row[k];
-            subtract(k, stride, solved, row, sides + m * stride);
-            scratch[m * stride + k] = solved;
+    for (int j = 0; j < stride; j++)
+        x[j] = j == n ? -1.0f : 0.0f;
+    for (int k = (n - 1) / PANEL * PANEL; k >= 0; k -= PANEL) {
+        int rows = n - k < PANEL ? n - k : PANEL;
+        float left[PANEL];
+        /* of all that is solved, and the right side; what stands left of that meets zeros */
+        for (int p = 0; p < rows; p++) {
+            const float *row = matrix + (k + p) * stride;
+            wide products = {0.0f};
+            for (int j = k / WIDE * WIDE; j < stride; j += WIDE)
+                products += *(const wide *)(row + j) * *(const wide *)(x + j);
+            left[p] = 0.0f;
+            for (int l = 0; l < WIDE; l++)
+                left[p] += products[l];
         }
-    }
-    for (int j = 0; j < many * stride; j++)
-        sides[j] = 0.0f;
-    for (int k = n - 1; k >= 0; k--) {
-        const float *restrict row = factor + k * stride;
-        for (int m = 0; m < many; m++) {
-            float sum = 0.0f;
-            for (int block = k / LANES * LANES; block < stride; block += LANES)
-                for (int l = block; l < block + LANES; l++)
-                    sum += row[l] * sides[m * stride + l];
-            sides[m * stride + k] = (scratch[m * stride + k] - sum) * row[k];
+        for (int p = rows - 1; p >= 0; p--) {
+            const float *row = matrix + (k + p) * stride + k;
+            for (int q = p + 1; q < rows; q++)
+                left[p] += row[q] * x[k + q];
+            x[k + p] = -left[p] * row[p];
         }
     }
 }

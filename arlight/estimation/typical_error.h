@@ -19,8 +19,8 @@ typedef struct {
     Memory **memories;   /* (many) */
     double *innovation;  /* (many, channels, size) */
     double *terms;       /* (4, size) scratch */
-    float *factor;       /* (stride, stride) scratch: Cholesky factor of one channel's correlations (`cholesky.h`) */
-    float *sides;        /* (2, stride) scratch */
+    float *equation;     /* (size + 4, stride) scratch: one channel's correlations and distances (`cholesky.h`) */
+    float *solution;     /* (stride) scratch */
     double *shares;      /* (3, size) scratch */
 } TypicalError;
 
@@ -99,17 +99,18 @@ static void set_shares(const TypicalError *typical, int channel, const double *r
     }
 }
 
-/* Factor of the covariance of one channel's distance between frame and memory, in its own deviations; 0 where it is
-   none. */
-static HOT int factor_channel(const TypicalError *typical, int channel, const double *restrict frame, double free,
-                              const double *restrict share, const double *restrict precision)
+/* Sets up the equation whose solution is one channel's distance between frame and memory divided by its covariance, all
+   in the distance's own deviations. */
+static HOT void set_equation(const TypicalError *typical, int channel, const double *restrict frame, double free,
+                             const double *restrict share, const double *restrict precision,
+                             const double *restrict distance)
 {
     int n = (int)typical->size, stride = row_length(n), at = channel * n;
     Terms terms = terms_of(typical->frame, channel);
     double *restrict scale = typical->terms, *restrict slope = scale + n, *restrict arm = slope + n;
     double *restrict part = arm + n;
     const double *restrict typical_row = typical->covariance + (int64_t)at * n;
-    float *restrict row = typical->factor;
+    float *restrict row = typical->equation;
     for (int j = 0; j < n; j++) {
         scale[j] = terms.scale[j] * precision[j];
         slope[j] = terms.slope[j] * precision[j];
@@ -117,23 +118,20 @@ static HOT int factor_channel(const TypicalError *typical, int channel, const do
         part[j] = share[j] * precision[j];
     }
     for (int i = 0; i < n; i++, frame += n, typical_row += n, row += stride) {
-        for (int j = i; j < n; j++)
+        for (int j = i / WIDE * WIDE; j < n; j++)
             row[j] = (float)(scale[i] * scale[j] * frame[j] + slope[i] * arm[j] + slope[j] * arm[i] +
                              part[i] * part[j] * typical_row[j]);
-        for (int j = n; j < stride; j++)
+        row[n] = (float)(distance[i] * precision[i]);
+        for (int j = n + 1; j < stride; j++)
             row[j] = 0.0f;
     }
-    for (int i = n; i < stride; i++, row += stride)
-        for (int j = 0; j < stride; j++)
-            row[j] = i == j;
-    typical->factor[0] += (float)(free * precision[0] * precision[0]);
-    return factorise(n, typical->factor);
+    typical->equation[0] += (float)(free * precision[0] * precision[0]);
 }
 
 /* Innovation of one channel as each number alone should take it: what the whole vector takes, P y, over the number's own
-   gain. `weight` is y, the distance divided by its covariance. */
+   gain. `weight` is y, the distance divided by its covariance, times the shares; `freed` what the level takes beside. */
 static HOT void spread_innovation(const TypicalError *typical, int channel, const double *restrict variance,
-                                  double free, const double *restrict share, const double *restrict weight,
+                                  double freed, const double *restrict share, const double *restrict weight,
                                   double *restrict innovation)
 {
     int n = (int)typical->size, at = channel * n;
@@ -141,8 +139,8 @@ static HOT void spread_innovation(const TypicalError *typical, int channel, cons
     for (int i = 0; i < n; i++, row += n) {
         double sum = 0.0;
         for (int j = 0; j < n; j++)
-            sum += row[j] * share[j] * weight[j];
-        double taken = share[i] * sum + (i == 0 ? free * weight[0] : 0.0);
+            sum += row[j] * weight[j];
+        double taken = share[i] * sum + (i == 0 ? freed : 0.0);
         innovation[i] = taken * (variance[i] + typical->frame->variance[at + i]) / variance[i];
     }
 }
@@ -151,22 +149,21 @@ static HOT void spread_innovation(const TypicalError *typical, int channel, cons
 static void weigh_channel(const TypicalError *typical, int channel, const double *frame, const Memory *memory,
                           double *restrict innovation)
 {
-    int n = (int)typical->size, stride = row_length(n), at = channel * n;
+    int n = (int)typical->size, at = channel * n;
     const double *variance = memory->variance + at;
     double *share = typical->shares, *precision = share + n, *weight = precision + n;
     double free = freedom(typical, channel, variance);
     for (int j = 0; j < n; j++)
         innovation[j] = typical->frame->values[at + j] - memory->values[at + j];
     set_shares(typical, channel, variance, free, share, precision);
-    if (!factor_channel(typical, channel, frame, free, share, precision))
+    set_equation(typical, channel, frame, free, share, precision, innovation);
+    if (!factorise(n, typical->equation))
         return;
-    float *side = typical->sides;
-    for (int j = 0; j < stride; j++)
-        side[j] = j < n ? (float)(innovation[j] * precision[j]) : 0.0f;
-    solve(n, typical->factor, 1, side, side + stride);
+    substitute(n, typical->equation, typical->solution);
     for (int j = 0; j < n; j++)
-        weight[j] = side[j] * precision[j];
-    spread_innovation(typical, channel, variance, free, share, weight, innovation);
+        weight[j] = share[j] * typical->solution[j] * precision[j];
+    double freed = free * typical->solution[0] * precision[0];
+    spread_innovation(typical, channel, variance, freed, share, weight, innovation);
 }
 
 /* Innovations of all memories with a frame of covariance (channels, size, size): as the Kalman filter of the whole

@@ -22,8 +22,8 @@ _LIBRARY.typical_start.argtypes = _LIBRARY.typical_weigh.argtypes = [ctypes.c_vo
 _LIBRARY.typical_average.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
 for _function in ("start", "weigh", "average"):
     getattr(_LIBRARY, f"typical_{_function}").restype = None
-_LANES = 16
-"""Floats by which rows of factors are padded (cholesky.h)."""
+_WIDE, _PANEL = 16, 4
+"""Floats of a vector and rows that are eliminated together (cholesky.h)."""
 
 
 class _Shared(Workspace):
@@ -37,7 +37,7 @@ class _Shared(Workspace):
         *((name, ctypes.c_void_p) for name in ("covariance", "diagonal", "frame")),
         ("many", ctypes.c_int64),
         ("memories", ctypes.POINTER(ctypes.c_void_p)),
-        *((name, ctypes.c_void_p) for name in ("innovation", "terms", "factor", "sides", "shares")),
+        *((name, ctypes.c_void_p) for name in ("innovation", "terms", "equation", "solution", "shares")),
     )
 
 
@@ -52,7 +52,7 @@ class TypicalError:
 
     def __init__(self, memory_s: float, frame: RelativeLight, memories: tuple[FadingMemory, ...]) -> None:
         channels, size = frame.values.shape
-        stride = -(-size // _LANES) * _LANES
+        stride = (size + _WIDE) // _WIDE * _WIDE
         self.covariance = np.zeros((channels, size, size))
         """(c, n, n) of relative light."""
         self.diagonal = np.zeros((channels, size))
@@ -72,8 +72,8 @@ class TypicalError:
                 "diagonal": self.diagonal,
                 "innovation": self._innovation,
                 "terms": np.zeros((4, size)),
-                "factor": np.zeros((stride, stride), np.float32),
-                "sides": np.zeros((2, stride), np.float32),
+                "equation": np.zeros((size + _PANEL, stride), np.float32),
+                "solution": np.zeros(stride, np.float32),
                 "shares": np.zeros((3, size)),
             }
         )
