@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Protocol
 
@@ -37,6 +37,9 @@ _LEVEL_DEVIATION = 0.005
 """Relative deviation beyond which the white paper's level is worse than the light's own from frame to frame."""
 _ALONE = 64
 """Rows of square matrices up to which OpenBLAS multiplies them on one thread by itself."""
+_LEAST_ORDER = 1
+"""Order up to which blocks are measured at least, where the sheet has it: lamps in the few blocks without stripes leave
+nothing that tells L_0."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -186,7 +189,8 @@ class LightingTracker:
         """The frame's own estimate, and when its blocks had been measured."""
         assert pose.camera_from_probe is not None
         blur_px = pose.blur_px if np.isfinite(pose.blur_px) else _DEFAULT_BLUR_PX
-        order = self._order_to_measure(frame.time_s)
+        wanted = self._order_to_measure(frame.time_s)
+        order = max(wanted, min(_LEAST_ORDER, self._highest))
         blocks = self._block_order <= order if order < self._highest else None
         last = self._last
         for _ in range(1 if last else _FIRST_PASSES):
@@ -201,7 +205,7 @@ class LightingTracker:
             last = estimate
         assert last is not None
         self._last = last
-        return last, measured
+        return last if wanted == order else replace(last, lighting=last.lighting.truncated(wanted)), measured
 
     def _order_to_measure(self, time_s: float) -> int:
         order = self.settings.order if isinstance(self.settings.order, int) else self._highest

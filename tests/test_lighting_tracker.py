@@ -265,6 +265,16 @@ def test_a_lower_order_is_told_as_well_without_a_look_at_the_rest(film):
     assert error(cut.lighting, synthetic.truth) < 1.3 * error(full.lighting.truncated(1), synthetic.truth) + 0.002
 
 
+@pytest.mark.parametrize("environment", ["hall", "studio"])
+def test_lamps_on_the_blocks_without_stripes_do_not_hide_the_level(film, environment):
+    tracker = LightingTracker(PROBE, CAMERA, TrackerSettings(order=0))
+    for synthetic in film(environment=environment, path="orbit"):
+        estimate = tracker.update(synthetic.frame)
+        assert (estimate.lighting.order, estimate.raw.order) == (0, 0)
+        missed = estimate.lighting.coefficients[0] - synthetic.truth.coefficients[0]
+        assert np.abs(missed).max() < 0.03 * synthetic.truth.coefficients[0].real.max()
+
+
 def test_the_order_follows_what_is_shown_and_what_an_effort_allows(film):
     count = 2 * len(PROBE.frequencies) - 1
     order = np.repeat(frequency_order(PROBE.frequencies), 2)[1:]
