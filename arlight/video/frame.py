@@ -152,7 +152,7 @@ class Frame:
             A frame in the same format; a grey frame becomes 4:2:0 colour.
         """
         planes, format_ = conversion.with_chroma(self.planes, self.format)
-        planes = tuple(plane.copy() for plane in planes)
+        planes = _copied(planes)
         if shade is not None:
             region = self._inside(shade.region)
             if dimming.node_box(region, self.size) != region:
@@ -174,6 +174,17 @@ class Frame:
         if region.clipped(self.size) != region:
             raise ValueError(f"region {tuple(region)} leaves the picture of {self.size[0]}x{self.size[1]} pixels")
         return region
+
+
+def _copied(planes: Planes) -> Planes:
+    """Copies that lie one after the other, as an encoder takes them."""
+    memory = np.empty(sum(plane.size for plane in planes), planes[0].dtype)
+    copies, first = [], 0
+    for plane in planes:
+        copies.append(memory[first : first + plane.size].reshape(plane.shape))
+        copies[-1][:] = plane
+        first += plane.size
+    return tuple(copies)
 
 
 def _image(values: ArrayLike, shape: tuple[int, ...], name: str) -> FloatImage:

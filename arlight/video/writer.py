@@ -14,6 +14,7 @@ import av.error
 import numpy as np
 from av.container import OutputContainer
 from av.video.stream import VideoStream
+from numpy.typing import NDArray
 
 from arlight.errors import OutputError
 from arlight.video.audio import AudioCopy, check_audio
@@ -176,10 +177,7 @@ class VideoWriter:
     def _write(self, frame: Frame) -> None:
         if frame.size != self._size:
             raise ValueError(f"expected frames of {self._size} pixels like the first one, found {frame.size}")
-        picture = self._picture
-        # a copy only should the encoder still hold the last one
-        picture.make_writable()
-        _fill(picture, frame.converted(self._format).planes)
+        picture = self._picture_of(frame.converted(self._format).planes)
         # two frames may not share a time: the container would refuse the second
         ticks = max(round(frame.time_s / self._tick_s), self._last_time + 1)
         picture.pts, picture.time_base, self._last_time = ticks, self._time_base, ticks
@@ -188,6 +186,15 @@ class VideoWriter:
         if self._audio:
             self._audio.write_until(frame.time_s + self._frame_s)
         self._container.mux(packets)
+
+    def _picture_of(self, planes: Planes) -> av.VideoFrame:
+        whole = _in_one_piece(planes)
+        if whole is not None:
+            return av.VideoFrame.from_numpy_buffer(whole, "yuv420p")
+        # a copy only should the encoder still hold the last one
+        self._picture.make_writable()
+        _fill(self._picture, planes)
+        return self._picture
 
 
 def encoded_format(frame: Frame) -> PixelFormat:
@@ -220,6 +227,17 @@ def check_output(path: Path, inputs: Sequence[Path]) -> None:
 
 def _location(format_: PixelFormat) -> str:
     return next(name for name, place in CHROMA_LOCATIONS.items() if place == format_.chroma_offset_px)
+
+
+def _in_one_piece(planes: Planes) -> NDArray[np.uint8] | None:
+    """Planes of 4:2:0 that lie one after the other, as (3 h / 2, w) codes of their own memory; None for others."""
+    memory, (h, w) = planes[0].base, planes[0].shape
+    starts = [planes[0].ctypes.data + offset for offset in (0, h * w, 5 * h * w // 4)]
+    together = isinstance(memory, np.ndarray) and memory.dtype == np.uint8 and 2 * memory.size == 3 * h * w
+    # PyAV tells the height from the rows of all planes together, in fours
+    if not together or h % 4 or w % 2 or [plane.ctypes.data for plane in planes] != starts:
+        return None
+    return np.asarray(memory, np.uint8).reshape(-1, w)
 
 
 def _fill(picture: av.VideoFrame, planes: Planes) -> None:

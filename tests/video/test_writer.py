@@ -2,6 +2,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -154,6 +155,32 @@ def test_a_frame_that_the_encoder_holds_back_is_not_touched_by_the_next(tmp_path
             writer.write(Frame.from_rgb(np.full((32, 48, 3), level, np.uint8), i, i / 30))
     found = [255 * f.encoded_rgb().mean() for f in VideoReader(tmp_path / "out.mp4")]
     np.testing.assert_allclose(found, levels, atol=1.5)
+
+
+@pytest.mark.parametrize("depth", [8, 10])
+@pytest.mark.parametrize("size", [(64, 48), (64, 46), (63, 48)])
+def test_where_planes_lie_in_memory_does_not_matter(tmp_path, size, depth):
+    rng, (w, h) = np.random.default_rng(8), size
+    format_ = PixelFormat("bt709", False, depth, chroma_shift=(1, 1), chroma_offset_px=chroma_offset_px("left", (1, 1)))
+    shapes = [(h, w), *[format_.chroma_size(size)[::-1]] * 2]
+    planes = tuple(rng.integers(60, 200, shape).astype(format_.dtype) for shape in shapes)
+    crossed = np.concatenate([plane.reshape(-1) for plane in (planes[0], planes[2], planes[1])])
+    starts = np.cumsum([0, planes[0].size, planes[1].size])
+    parts = [
+        crossed[start : start + plane.size].reshape(plane.shape) for start, plane in zip(starts, planes, strict=True)
+    ]
+    apart = Frame(0, 0.0, planes, format_)
+    frames = {
+        "apart": apart,
+        "together": apart.composed(),
+        "crossed": replace(apart, planes=(parts[0], parts[2], parts[1])),
+    }
+    for name, frame in frames.items():
+        with VideoWriter(tmp_path / f"{name}.mp4") as writer:
+            for i in range(3):
+                writer.write(replace(frame, index=i, time_s=i / 30))
+    found = [packets_of(tmp_path / f"{name}.mp4", "video") for name in frames]
+    assert found[0] == found[1] == found[2]
 
 
 def test_frames_that_share_a_time_are_kept_apart(tmp_path):
