@@ -7,7 +7,7 @@
 #include <string.h>
 
 typedef struct {
-    float x, y;        /* whole numbers: place in 1 / SNAP of a sample */
+    int32_t x, y;      /* place in 1 / SNAP of a sample */
     float u, v;        /* texture coordinates over the depth */
     float radiance[3]; /* over the depth; of the body alone where it has a texture */
     float nearness;    /* 1 / depth, 0 where the corner is not to be drawn */
@@ -44,7 +44,7 @@ INLINE void place_corners(const Raster *r)
         Four light = *(const Four *)(r->body + 4 * i) + share * *(const Four *)(r->mirrored + 4 * i);
         light[3] = 1.0f;
         Corner *corner = r->corners + i;
-        corner->x = x, corner->y = y, corner->u = corner->v = 0.0f;
+        corner->x = drawn ? (int32_t)x : 0, corner->y = drawn ? (int32_t)y : 0, corner->u = corner->v = 0.0f;
         *(Four *)corner->radiance = light * nearness;
     }
     if (r->texture_place)
@@ -174,7 +174,7 @@ INLINE void draw_face(const Raster *r, const int32_t given[3])
     int32_t face[3] = {given[0], given[1], given[2]};
     Triangle t;
     for (int i = 0; i < 3; i++)
-        t.x[i] = (int32_t)r->corners[face[i]].x, t.y[i] = (int32_t)r->corners[face[i]].y;
+        t.x[i] = r->corners[face[i]].x, t.y[i] = r->corners[face[i]].y;
     int64_t area = twice_area(&t);
     /* what is counter-clockwise seen from the camera has a negative area where rows run downward */
     if (area == 0 || (r->closed && area > 0))
