@@ -1,6 +1,7 @@
 """Where the camera sees an object: pixels, the region they fill, clip coordinates; lens distortion included."""
 
 import ctypes
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,8 +52,8 @@ class Projected:
             return Region(0, 0, width, height)
         x0, y0, x1, y1 = (min(max(v, -1e6), 1e6) for v in self.box_px)
         region = Region(
-            int(np.floor(x0)) - margin_px, int(np.floor(y0)) - margin_px,
-            int(np.ceil(x1)) + 1 + margin_px, int(np.ceil(y1)) + 1 + margin_px,
+            math.floor(x0) - margin_px, math.floor(y0) - margin_px,
+            math.ceil(x1) + 1 + margin_px, math.ceil(y1) + 1 + margin_px,
         ).clipped(self.frame_size)  # fmt: skip
         return region if min(region.size) > 0 else None
 

@@ -119,6 +119,7 @@ class Relighter:
         self._native = self._native_drawer() if s.renderer == "native" else None
         self._opened: ObjectDrawer | None = None
         self._known: NDArray[np.int64] | None = None
+        self._darkened: tuple[bytes, NDArray[np.float32]] | None = None
 
     def render(
         self, frame: Frame, camera_from_probe: Pose | None, lighting: Lighting | None, effort: Effort | None = None
@@ -160,8 +161,12 @@ class Relighter:
 
     def _darkening(self, packed: NDArray[np.float32]) -> NDArray[np.float32]:
         """(side, side, 4) what the object leaves of the plane's light, faint shadow aside."""
-        hidden, open_plane = self._plane_rows.light(packed)
-        return self._plane_darkening.ratio(hidden, open_plane[0, :3])
+        content = packed.tobytes()
+        # light that is not measured in every frame is often that of the last one
+        if self._darkened is None or content != self._darkened[0]:
+            hidden, open_plane = self._plane_rows.light(packed)
+            self._darkened = content, self._plane_darkening.ratio(hidden, open_plane[0, :3])
+        return self._darkened[1]
 
     def draw_object(self, camera_from_probe: Pose, lighting: Lighting) -> tuple[Region, NDArray[np.float32]] | None:
         """The object alone: its region of the frame, and linear premultiplied radiance and coverage (h, w, 4) there."""

@@ -141,6 +141,15 @@ def test_light_is_linear(relighter, pose, lighting_of):
     assert difference.max() < 0.03 * images[2].max()
 
 
+def test_light_that_stays_or_returns_casts_the_shadow_it_cast(probe, camera, relighter, pose, lighting_of, environment):
+    light, other = lighting_of(environment), lighting_of(load_environment("bridge").scaled(0.2))
+    moved = replace(pose, translation=pose.translation * 1.1)
+    for each, seen_from in ((light, pose), (light, moved), (other, moved), (light, moved)):
+        found = relighter.render(frame_of(), seen_from, each)
+        alone = Relighter(default_object(), probe, camera, QUICK).render(frame_of(), seen_from, each)
+        assert all(np.array_equal(*planes) for planes in zip(found.planes, alone.planes, strict=True))
+
+
 def test_a_lens_bends_object_and_shadow_alike(probe, lens_camera, pose, lighting_of, environment):
     relighter = Relighter(default_object(), probe, lens_camera, QUICK)
     relit = relighter.render(frame_of(), pose, lighting_of(environment))
