@@ -14,9 +14,9 @@ enum { WITH_MIRROR = 6, MIRROR_SQUARE = 9, VALUES = 10, VALUES_MIRROR = 13 };
 INLINE void invert(lanes *a)
 {
     lanes reciprocal[ROWS];
-    for (int r = 0; r < ROWS; r++) {
+    UNROLLED for (int r = 0; r < ROWS; r++) {
         lanes scaled[ROWS], diagonal = a[PAIR[r][r]], pivot = diagonal;
-        for (int s = 0; s < r; s++) {
+        UNROLLED for (int s = 0; s < r; s++) {
             scaled[s] = a[PAIR[r][s]];
             for (int k = 0; k < s; k++)
                 scaled[s] -= scaled[k] * a[PAIR[s][k]];
@@ -26,15 +26,15 @@ INLINE void invert(lanes *a)
         reciprocal[r] = 1.0 / larger(pivot, SINGULAR * diagonal);
     }
     /* the factor's inverse, below a diagonal of ones */
-    for (int s = 0; s < ROWS; s++)
-        for (int r = s + 1; r < ROWS; r++) {
+    UNROLLED for (int s = 0; s < ROWS; s++)
+        UNROLLED for (int r = s + 1; r < ROWS; r++) {
             lanes sum = a[PAIR[r][s]];
             for (int k = s + 1; k < r; k++)
                 sum += a[PAIR[r][k]] * a[PAIR[k][s]];
             a[PAIR[r][s]] = -sum;
         }
-    for (int r = 0; r < ROWS; r++)
-        for (int s = 0; s <= r; s++) {
+    UNROLLED for (int r = 0; r < ROWS; r++)
+        UNROLLED for (int s = 0; s <= r; s++) {
             lanes sum = r == s ? reciprocal[r] : reciprocal[r] * a[PAIR[r][s]];
             for (int k = r + 1; k < ROWS; k++)
                 sum += reciprocal[k] * a[PAIR[k][r]] * a[PAIR[k][s]];
@@ -48,7 +48,7 @@ INLINE void row_precision(const ChannelFit *f, int64_t b, lanes *p)
     lanes noise = at(f, NOISE, b), trust = at(f, TRUST, b), weight = load(f->weight + b), counts[HARMONICS + 1];
     for (int h = 0; h <= HARMONICS; h++)
         counts[h] = at(f, USABLE + h, b);
-    for (int r = 0; r < ROWS; r++)
+    UNROLLED for (int r = 0; r < ROWS; r++)
         for (int s = 0; s <= r; s++) {
             int h = harmonic_of_row(r);
             lanes both = counts[h] * counts[harmonic_of_row(s)];
@@ -60,7 +60,7 @@ INLINE void row_precision(const ChannelFit *f, int64_t b, lanes *p)
             p[PAIR[r][s]] = value;
         }
     invert(p);
-    for (int r = 0; r < ROWS; r++)
+    UNROLLED for (int r = 0; r < ROWS; r++)
         for (int s = 0; s <= r; s++) {
             lanes seen = s ? trust * trust * weight : r ? trust * weight : weight;
             p[PAIR[r][s]] *= counts[harmonic_of_row(r)] * counts[harmonic_of_row(s)] * seen;
@@ -70,7 +70,7 @@ INLINE void row_precision(const ChannelFit *f, int64_t b, lanes *p)
 /* Precision times a column of rows. */
 INLINE void weigh(const lanes *p, const lanes *column, lanes *weighted)
 {
-    for (int r = 0; r < ROWS; r++) {
+    UNROLLED for (int r = 0; r < ROWS; r++) {
         weighted[r] = p[PAIR[r][0]] * column[0];
         for (int s = 1; s < ROWS; s++)
             weighted[r] += p[PAIR[r][s]] * column[s];
@@ -103,7 +103,7 @@ INLINE void eliminate_lamp(const ChannelFit *f, int64_t b, lanes *p, const lanes
     lanes telling[ROWS], lamp = load(f->lamp + b);
     weigh(p, mirror, telling);
     lanes spread = lamp / (1.0 + lamp * product(telling, mirror));
-    for (int r = 0; r < ROWS; r++)
+    UNROLLED for (int r = 0; r < ROWS; r++)
         for (int s = 0; s <= r; s++)
             p[PAIR[r][s]] -= spread * telling[r] * telling[s];
     put_rows(f, TELLING, b, telling);
@@ -121,15 +121,15 @@ static HOT void block_equations(const ChannelFit *f)
         eliminate_lamp(f, b, p, mirror);
         for (int r = 0; r < ROWS; r++)
             mirror[r] *= load(m->face + b);
-        for (int i = 0; i < PAIRS; i++)
+        UNROLLED for (int i = 0; i < PAIRS; i++)
             put(f, PRECISION + i, b, p[i]);
         for (int r = 0; r < ROWS; r++)
             values[r] = load(m->measured + (f->channel * ROWS + r) * m->stride + b);
-        for (int k = 0, pair = 0; k < COLUMNS; k++) {
+        UNROLLED for (int k = 0, pair = 0; k < COLUMNS; k++) {
             load_rows(f, DESIGN + k * ROWS, b, columns[k]);
             weigh(p, columns[k], weighted);
             put_rows(f, WEIGHTED + k * ROWS, b, weighted);
-            for (int l = 0; l <= k; l++, pair++)
+            UNROLLED for (int l = 0; l <= k; l++, pair++)
                 put(f, GRAM + pair, b, product(weighted, columns[l]));
             put(f, GRAM + WITH_MIRROR + k, b, product(weighted, mirror));
             put(f, GRAM + VALUES + k, b, product(weighted, values));

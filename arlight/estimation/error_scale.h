@@ -90,7 +90,7 @@ static HOT void block_covariances(const ChannelFit *f)
 INLINE lanes precision_left(const ChannelFit *f, int64_t b, int r, const lanes *covariance)
 {
     lanes left = at(f, PRECISION + PAIR[r][r], b), column[COLUMNS + 1];
-    for (int k = 0, pair = 0; k <= COLUMNS; k++) {
+    UNROLLED for (int k = 0, pair = 0; k <= COLUMNS; k++) {
         column[k] = at(f, WEIGHTED + k * ROWS + r, b);
         for (int l = 0; l <= k; l++, pair++)
             left -= (k == l ? 1.0 : 2.0) * covariance[pair] * column[k] * column[l];
@@ -119,11 +119,11 @@ static HOT void error_scales(const ChannelFit *f)
         lanes covariance[ENTRIES], p[PAIRS], missed[ROWS], pull[ROWS], trust = at(f, TRUST, b);
         for (int k = 0; k < ENTRIES; k++)
             covariance[k] = at(f, BLOCK + k, b);
-        for (int k = 0; k < PAIRS; k++)
+        UNROLLED for (int k = 0; k < PAIRS; k++)
             p[k] = at(f, PRECISION + k, b);
         load_rows(f, MISSED, b, missed);
         weigh(p, missed, pull);
-        for (int r = 0; r < ROWS; r++) {
+        UNROLLED for (int r = 0; r < ROWS; r++) {
             int h = harmonic_of_row(r);
             lanes model = at(f, MODEL + h, b), own = load(m->pixels + PAIR[r][r] * m->stride + b) * at(f, NOISE, b);
             if (h) {

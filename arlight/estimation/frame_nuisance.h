@@ -57,19 +57,19 @@ static HOT void nuisance_equations(const ChannelFit *f, double mean, Step *s)
     for (int64_t b = 0; b < f->m->blocks; b += LANES) {
         lanes slopes[NUISANCES][ROWS], p[PAIRS], weighted[ROWS], missed[ROWS], column[ROWS];
         slopes_of_rows(f, b, mean, slopes);
-        for (int i = 0; i < PAIRS; i++)
+        UNROLLED for (int i = 0; i < PAIRS; i++)
             p[i] = at(f, PRECISION + i, b);
         load_rows(f, MISSED, b, missed);
-        for (int k = 0; k < NUISANCES; k++) {
+        UNROLLED for (int k = 0; k < NUISANCES; k++) {
             put_rows(f, SLOPES + k * ROWS, b, slopes[k]);
             weigh(p, slopes[k], weighted);
             right[k] += product(weighted, missed);
-            for (int l = 0; l <= k; l++)
+            UNROLLED for (int l = 0; l <= k; l++)
                 information[k][l] += product(weighted, slopes[l]);
         }
-        for (int c = 0; c <= COLUMNS; c++) {
+        UNROLLED for (int c = 0; c <= COLUMNS; c++) {
             load_rows(f, WEIGHTED + c * ROWS, b, column);
-            for (int k = 0; k < NUISANCES; k++)
+            UNROLLED for (int k = 0; k < NUISANCES; k++)
                 put(f, CROSS + c * NUISANCES + k, b, product(column, slopes[k]));
         }
     }

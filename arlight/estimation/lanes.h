@@ -6,6 +6,8 @@
 
 #define LANES 4
 #define INLINE static inline __attribute__((always_inline))
+/* For loops that contain others, or are long: which of an array of vectors is meant has to be known. */
+#define UNROLLED _Pragma("GCC unroll 28")
 
 typedef double lanes __attribute__((vector_size(32)));
 typedef int64_t lane_bits __attribute__((vector_size(32)));

@@ -24,7 +24,7 @@ static HOT void miss(const ChannelFit *f, double mean, const double *step)
     for (int64_t b = 0; b < m->blocks; b += LANES) {
         lanes missed[ROWS], telling[ROWS];
         lit_rows(f, b, mean, missed);
-        for (int r = 0; r < ROWS; r++) {
+        UNROLLED for (int r = 0; r < ROWS; r++) {
             missed[r] = load(m->measured + (f->channel * ROWS + r) * m->stride + b) - missed[r];
             for (int k = 0; k < NUISANCES && step; k++)
                 missed[r] -= step[k] * at(f, SLOPES + k * ROWS + r, b);
