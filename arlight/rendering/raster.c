@@ -1,5 +1,6 @@
 /* Draws lit triangles: the nearest one at every sample, its corners' radiance interpolated in perspective. */
 #include "native.h"
+#include "bands.h"
 #include "samples.h"
 #include "texture.h"
 #include "triangle.h"
@@ -21,6 +22,7 @@ typedef struct {
     const int32_t *faces;  /* (face_count, 3), counter-clockwise from outside */
     const float *texture_place; /* (n, 3) u, v, layer; null without textures */
     Corner *corners;       /* (n,) */
+    Bands bands;           /* which faces to draw in which rows */
     Samples samples;       /* of the region */
     int64_t vertex_count, face_count;
     int64_t closed;        /* whether faces that are turned away cannot be seen */
@@ -96,16 +98,17 @@ INLINE void draw_columns(
     }
 }
 
-/* A small triangle inside the picture. */
+/* A small triangle between the picture's sides. */
 INLINE void draw_small(const Samples *s, const Triangle *t, const Gradient *g)
 {
     Edges edges = edges_of(t);
-    int64_t at = t->top * s->width + t->left;
+    int top = t->top > s->top ? t->top : (int)s->top, bottom = t->bottom < s->bottom ? t->bottom : (int)s->bottom;
+    int64_t at = place_of(s, top, t->left);
     for (int right = 0; right < t->right - t->left; right += SIDE_BY_SIDE) {
         EightBits outside[3];
         for (int i = 0; i < 3; i++)
-            outside[i] = edges.first[i] + edges.across[i] * (right + COLUMN);
-        draw_columns(s, at + right, 0, t->bottom - t->top, g, right, outside, edges.down);
+            outside[i] = edges.first[i] + edges.across[i] * (right + COLUMN) + edges.down[i] * (top - t->top);
+        draw_columns(s, at + right, top - t->top, bottom - t->top, g, right, outside, edges.down);
     }
 }
 
@@ -114,13 +117,13 @@ INLINE void draw_rows(const Samples *s, const Triangle *t, const Gradient *g)
 {
     const int32_t still[3] = {0, 0, 0};
     int from, to;
-    for (Rows rows = rows_of(t, (int)s->height); rows.row < rows.end; next_row(&rows)) {
+    for (Rows rows = rows_of(t, (int)s->top, (int)s->bottom, (int)s->height); rows.row < rows.end; next_row(&rows)) {
         samples_of_row(&rows, (int)s->width, &from, &to);
         for (int column = from; column < to; column += SIDE_BY_SIDE) {
             /* the sign of what is left of the row */
             EightBits left = to - column - 1 - COLUMN, outside[3] = {left, left, left};
             int below = rows.row - t->top;
-            draw_columns(s, rows.row * s->width + column, below, below + 1, g, column - t->left, outside, still);
+            draw_columns(s, place_of(s, rows.row, column), below, below + 1, g, column - t->left, outside, still);
         }
     }
 }
@@ -150,10 +153,10 @@ INLINE void draw_textured(const Raster *r, const Triangle *t, const int32_t face
     Gradient glosses = gradient_of(t, over_area, gloss[0], gloss[1], gloss[2]);
     Picture picture = picture_of(r, face, over_area);
     int from, to;
-    for (Rows rows = rows_of(t, (int)s->height); rows.row < rows.end; next_row(&rows)) {
+    for (Rows rows = rows_of(t, (int)s->top, (int)s->bottom, (int)s->height); rows.row < rows.end; next_row(&rows)) {
         samples_of_row(&rows, (int)s->width, &from, &to);
         for (int column = from; column < to; column++) {
-            int64_t at = rows.row * s->width + column;
+            int64_t at = place_of(s, rows.row, column);
             int right = column - t->left, below = rows.row - t->top;
             Four body = value_at(g, right, below);
             if (!(body[3] > s->planes[at]))
@@ -168,17 +171,48 @@ INLINE void draw_textured(const Raster *r, const Triangle *t, const int32_t face
     }
 }
 
-/* A face whose corners are all in front of the camera. */
-INLINE void draw_face(const Raster *r, const int32_t given[3])
+/* The corners on the grid. */
+INLINE Triangle triangle_of(const Raster *r, const int32_t face[3])
 {
-    int32_t face[3] = {given[0], given[1], given[2]};
     Triangle t;
     for (int i = 0; i < 3; i++)
         t.x[i] = r->corners[face[i]].x, t.y[i] = r->corners[face[i]].y;
+    return t;
+}
+
+/* Whether a face can be seen: its corners are in front of the camera, and it is not turned away. */
+INLINE int is_seen(const Raster *r, const int32_t face[3])
+{
+    const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
+    Triangle t = triangle_of(r, face);
     int64_t area = twice_area(&t);
     /* what is counter-clockwise seen from the camera has a negative area where rows run downward */
-    if (area == 0 || (r->closed && area > 0))
-        return;
+    return (a->nearness > 0.0f) & (b->nearness > 0.0f) & (c->nearness > 0.0f) & ((area < 0) | (!r->closed & (area > 0)));
+}
+
+/* Finds the faces that are to be drawn, and the band that each begins in. */
+INLINE void sort_faces(const Raster *r)
+{
+    const Samples *s = &r->samples;
+    int64_t listed = 0;
+    begin_listing(&r->bands);
+    for (int64_t i = 0; i < r->face_count; i++) {
+        const int32_t *face = r->faces + 3 * i;
+        Triangle t = triangle_of(r, face);
+        find_box(&t);
+        int drawn = is_seen(r, face) & (t.left < t.right) & (t.top < t.bottom) & (t.right > 0) & (t.bottom > 0);
+        drawn &= (t.left < s->width) & (t.top < s->height);
+        listed = list_face(&r->bands, listed, (int32_t)i, t.top, drawn);
+    }
+    sort_listed(&r->bands, listed);
+}
+
+/* Draws a face's samples in the band; the row after its last. */
+INLINE int draw_face(const Raster *r, const int32_t given[3])
+{
+    int32_t face[3] = {given[0], given[1], given[2]};
+    Triangle t = triangle_of(r, face);
+    int64_t area = twice_area(&t);
     if (area < 0) {
         area = -area;
         int32_t x = t.x[1], y = t.y[1];
@@ -186,12 +220,6 @@ INLINE void draw_face(const Raster *r, const int32_t given[3])
         face[2] = given[1], t.x[2] = x, t.y[2] = y;
     }
     find_box(&t);
-    const Samples *s = &r->samples;
-    int inside = (t.left >= 0) & (t.top >= 0) & (t.right <= s->width) & (t.bottom <= s->height);
-    if (t.left >= t.right || t.top >= t.bottom || t.right <= 0 || t.bottom <= 0)
-        return;
-    if (t.left >= s->width || t.top >= s->height)
-        return;
     Four corner[3];
     for (int i = 0; i < 3; i++)
         corner[i] = *(const Four *)r->corners[face[i]].radiance;
@@ -199,22 +227,36 @@ INLINE void draw_face(const Raster *r, const int32_t given[3])
     Gradient g = gradient_of(&t, over_area, corner[0], corner[1], corner[2]);
     if (r->texture_place)
         draw_textured(r, &t, face, over_area, &g);
-    else if (inside && is_small(&t))
-        draw_small(s, &t, &g);
+    else if ((t.left >= 0) & (t.right <= r->samples.width) & is_small(&t))
+        draw_small(&r->samples, &t, &g);
     else
-        draw_rows(s, &t, &g);
+        draw_rows(&r->samples, &t, &g);
+    return t.bottom;
+}
+
+/* Draws a band's faces. */
+INLINE void draw_band(const Raster *r, Band *band)
+{
+    while (has_face(band)) {
+        int32_t face = next_face(band);
+        *band->kept = face;
+        band->kept += draw_face(r, r->faces + 3 * face) > r->samples.bottom;
+    }
 }
 
 /* The picture (height / side, width / side, 4): radiance times coverage, and coverage. */
-EXPORT HOT void draw(const Raster *r, Four *drawn)
+EXPORT HOT void draw(Raster *r, Four *drawn)
 {
-    const Samples *s = &r->samples;
+    Samples *s = &r->samples;
+    Band band = {0};
     place_corners(r);
-    memset(s->planes, 0, (size_t)(s->width * s->height) * sizeof *s->planes);
-    for (const int32_t *face = r->faces; face < r->faces + 3 * r->face_count; face += 3) {
-        const Corner *a = r->corners + face[0], *b = r->corners + face[1], *c = r->corners + face[2];
-        if ((a->nearness > 0.0f) & (b->nearness > 0.0f) & (c->nearness > 0.0f))
-            draw_face(r, face);
+    sort_faces(r);
+    for (int64_t number = 0; number < r->bands.count; number++) {
+        s->top = number * r->bands.rows;
+        s->bottom = s->top + r->bands.rows < s->height ? s->top + r->bands.rows : s->height;
+        memset(s->planes, 0, (size_t)(s->width * (s->bottom - s->top)) * sizeof *s->planes);
+        band = begin_band(&r->bands, number, &band);
+        draw_band(r, &band);
+        mean_of_samples(s, r->side, drawn);
     }
-    mean_of_samples(s, r->side, drawn);
 }

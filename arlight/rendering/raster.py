@@ -21,8 +21,8 @@ _CORNER = 8
 """Numbers of a corner, as in raster.c."""
 _SIDE_BY_SIDE = 8
 """Samples that are drawn at once, as in samples.h."""
-_MOST_SAMPLES = 1 << 21
-"""A picture of more samples is drawn in bands, so that memory stays bounded."""
+_BAND_SAMPLES = 1 << 15
+"""A picture is drawn in bands of about so many samples: they stay in the processor's cache."""
 _shade = library(__file__, "shading", keeps_lock=True).shade
 _draw = library(__file__, "raster").draw
 _shade.restype = _draw.restype = None
@@ -42,8 +42,10 @@ class _Shading(Workspace):
 class _Raster(Workspace):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("pixels", "depth_mm", "body", "mirrored", "faces", "texture_place")),
-        *((name, ctypes.c_void_p) for name in ("corners", "planes")),
-        *((name, ctypes.c_int64) for name in ("plane", "width", "height")),
+        *((name, ctypes.c_void_p) for name in ("corners", "listed", "sorted", "kept", "band_ends")),
+        *((name, ctypes.c_int64) for name in ("room", "bands", "band_rows")),
+        ("planes", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("plane", "width", "height", "top", "bottom")),
         *((name, ctypes.c_int64) for name in ("vertex_count", "face_count", "closed", "samples")),
         *((name, ctypes.c_void_p) for name in ("levels", "linear")),
         *((name, ctypes.c_int64) for name in ("layers", "texture_width", "texture_height", "level_count")),
@@ -95,14 +97,18 @@ class RasterRenderer:
         )
         lit = {"body": np.empty((n, 4), np.float32), "mirrored": np.empty((n, 4), np.float32)}
         self._shading.hold(lit)
-        self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed)
+        # the list of faces is written one beyond its end
+        room = len(mesh.faces) + 1
+        self._raster = _Raster(vertex_count=n, face_count=len(mesh.faces), closed=mesh.closed, room=room)
+        self._raster.hold({name: np.empty((2, room), np.int32) for name in ("listed", "kept")})
+        self._raster.hold({"sorted": np.empty(room, np.int32)})
         self.supersampling = supersampling
         """Samples along a pixel's side; may change from picture to picture."""
         corners = np.zeros((n, _CORNER), np.float32)
         self._raster.hold(lit | {"faces": np.ascontiguousarray(mesh.faces, np.int32), "corners": corners})
         if mesh.textures is not None and mesh.uv is not None and mesh.layer is not None:
             self._hold_textures(mesh.textures, np.column_stack([mesh.uv, mesh.layer]))
-        self._drawn = np.empty(0, np.float32)
+        self._drawn, self._band_ends = np.empty(0, np.float32), np.empty(0, np.int32)
 
     def draw(self, view: View, packed: NDArray[np.float32]) -> Image:
         """One picture of the object.
@@ -121,13 +127,9 @@ class RasterRenderer:
         raster.pixels = address(view.projected.pixels, np.float32)
         raster.depth_mm = address(view.projected.depth_mm, np.float32)
         raster.near_mm, raster.left_px = view.projected.near_mm, region.x0
-        raster.width = width * samples
-        rows = max(min(height, _MOST_SAMPLES // (width * samples**2)), 1)
-        self._reserve(raster.width * rows * samples, 4 * width * height)
-        picture = address(self._drawn, np.float32)
-        for top in range(0, height, rows):
-            raster.top_px, raster.height = region.y0 + top, min(rows, height - top) * samples
-            _draw(ctypes.byref(raster), picture + 16 * width * top)
+        raster.width, raster.height, raster.top_px = width * samples, height * samples, region.y0
+        self._reserve(4 * width * height)
+        _draw(ctypes.byref(raster), address(self._drawn, np.float32))
         return self._drawn[: 4 * width * height].reshape(height, width, 4)
 
     def release(self) -> None:
@@ -158,10 +160,17 @@ class RasterRenderer:
             }
         )
 
-    def _reserve(self, samples: int, values: int) -> None:
-        """Room for samples and picture; it only grows."""
-        if self._raster.plane < samples + _SIDE_BY_SIDE:
-            self._raster.plane = plane = samples + _SIDE_BY_SIDE
-            self._raster.hold({"planes": np.empty((4, plane), np.float32)})
+    def _reserve(self, values: int) -> None:
+        """Room for the samples of a band and for the picture; it only grows."""
+        raster = self._raster
+        pixel_rows = max(_BAND_SAMPLES // (raster.width * raster.samples), 1)
+        raster.band_rows = pixel_rows * raster.samples
+        raster.bands = -(-raster.height // raster.band_rows)
+        if raster.plane < raster.width * raster.band_rows + _SIDE_BY_SIDE:
+            raster.plane = plane = raster.width * raster.band_rows + _SIDE_BY_SIDE
+            raster.hold({"planes": np.empty((4, plane), np.float32)})
+        if len(self._band_ends) < raster.bands:
+            self._band_ends = np.empty(raster.bands, np.int32)
+            raster.hold({"band_ends": self._band_ends})
         if len(self._drawn) < values:
             self._drawn = np.empty(values, np.float32)

@@ -1,4 +1,4 @@
-/* The samples of a picture: what is nearest at each, drawn eight side by side. */
+/* The samples of a band of a picture's rows: what is nearest at each, drawn eight side by side. */
 #ifndef ARLIGHT_SAMPLES_H
 #define ARLIGHT_SAMPLES_H
 
@@ -10,9 +10,13 @@ enum { SIDE_BY_SIDE = 8 };
 
 typedef struct {
     float *planes; /* (4, plane) 1 / depth of what is drawn, 0 where nothing is; its red, green, blue, or anything */
-    int64_t plane; /* height * width + SIDE_BY_SIDE at least: samples are written in eights, also the last one */
-    int64_t width, height;
+    int64_t plane; /* rows * width + SIDE_BY_SIDE at least: samples are written in eights, also the last one */
+    int64_t width, height; /* of the picture */
+    int64_t top, bottom;   /* the band: from the first row to before the last */
 } Samples;
+
+/* Where a sample of the band is in its planes. */
+INLINE int64_t place_of(const Samples *s, int64_t row, int64_t column) { return (row - s->top) * s->width + column; }
 
 /* Where `seen` the value replaces what is there. */
 INLINE void put_where(EightBits seen, Eight value, float *there)
@@ -76,11 +80,12 @@ INLINE Four mean_of_one(const Samples *s, const float *samples, int64_t side)
     return sum * (1.0f / (float)(side * side));
 }
 
-/* The picture (height / side, width / side, 4) of the samples. */
+/* The band's pixels of a picture (height / side, width / side, 4). */
 INLINE void mean_of_samples(const Samples *s, int64_t side, Four *drawn)
 {
     int64_t columns = s->width / side, together = side == 2 ? columns / SIDE_BY_SIDE * SIDE_BY_SIDE : 0;
-    for (int64_t row = 0; row < s->height / side; row++, drawn += columns) {
+    drawn += s->top / side * columns;
+    for (int64_t row = 0; row < (s->bottom - s->top) / side; row++, drawn += columns) {
         const float *samples = s->planes + row * side * s->width;
         for (int64_t column = 0; column < together; column += SIDE_BY_SIDE)
             mean_of_eight(s, samples + 2 * column, drawn + column);

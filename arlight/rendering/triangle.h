@@ -87,12 +87,12 @@ INLINE int64_t units(double samples)
     return (int64_t)((near > -ASIDE ? near : -ASIDE) * ONE);
 }
 
-/* Start at the first of its rows within the height. */
-INLINE Rows rows_of(const Triangle *t, int height)
+/* Its rows from `top` to before `bottom`, of a picture of some height. */
+INLINE Rows rows_of(const Triangle *t, int top, int bottom, int height)
 {
     const double sample = 1.0 / SNAP;
     Rows rows = {.left[1] = INT64_MIN / 2, .right[1] = INT64_MAX / 2};
-    rows.row = within(t->top, height), rows.end = within(t->bottom, height);
+    rows.row = t->top > top ? t->top : top, rows.end = t->bottom < bottom ? t->bottom : bottom;
     int lefts = 0, rights = 0;
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
