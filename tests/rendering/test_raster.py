@@ -108,24 +108,31 @@ def test_opengl_draws_the_same(request, which, pose, reconstruction):
 @pytest.mark.parametrize("faces", [60, 2000])
 @pytest.mark.parametrize("supersampling", [1, 2, 3])
 def test_the_height_of_bands_does_not_matter(camera, pose, monkeypatch, faces, supersampling):
-    """Large faces, which go on through many bands; and each face twice, of which the first drawn is to stay."""
-    once = default_object(faces).placed(60.0)
-    twice = replace(
-        once,
-        vertices_mm=np.tile(once.vertices_mm, (2, 1)),
-        normals=np.tile(once.normals, (2, 1)),
-        faces=np.concatenate([once.faces, once.faces + len(once.vertices_mm)]),
-        base_colour=np.tile(once.base_colour, (2, 1)),
-    )
-    # no two vertices are of one radiance
-    radiance = np.random.default_rng(6).permutation(len(twice.vertices_mm)) + 1.0
+    """Also where large faces go on through many bands."""
+    mesh = default_object(faces).placed(60.0)
+    radiance = np.random.default_rng(6).permutation(len(mesh.vertices_mm)) + 1.0
     pictures = []
     for samples in (1, 3000, 1 << 30):
         monkeypatch.setattr("arlight.rendering.raster._BAND_SAMPLES", samples)
-        pictures.append(drawn(matte_renderer(twice, radiance, supersampling), twice, camera, pose))
+        pictures.append(drawn(matte_renderer(mesh, radiance, supersampling), mesh, camera, pose))
     assert pictures[0][..., 3].any()
     assert np.array_equal(pictures[0], pictures[2])
     assert np.array_equal(pictures[1], pictures[2])
+
+
+@pytest.mark.parametrize("band_samples", [1, 1000, 1 << 30])
+def test_of_faces_at_one_depth_the_first_stays(camera, looking_down, monkeypatch, band_samples):
+    monkeypatch.setattr("arlight.rendering.raster._BAND_SAMPLES", band_samples)
+    rng, pose = np.random.default_rng(9), looking_down(0.0, 300.0)
+    mesh = flat_mesh(rng.uniform(-30, 30, (60, 2)), np.arange(60).reshape(20, 3))
+    region = project(camera, pose, mesh.vertices_mm).region()
+    together = drawn(matte_renderer(mesh, np.repeat(np.arange(20) + 1.0, 3)), mesh, camera, pose, region=region)
+    expected = np.zeros(together.shape[:2])
+    for i, face in enumerate(mesh.faces):
+        alone = drawn(matte_renderer(replace(mesh, faces=face[None]), 1.0), mesh, camera, pose, region=region)[..., 3]
+        expected = np.where((expected == 0.0) & (alone > 0.0), i + 1.0, expected)
+    assert len(np.unique(expected)) > 8
+    np.testing.assert_allclose(together[..., 0], expected, rtol=1e-5)
 
 
 def test_what_reaches_behind_the_camera_is_left_out_and_the_rest_drawn(camera, pose):
