@@ -50,7 +50,7 @@ static HOT float sum_list(int total, const float *restrict values, float *least)
 static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
     int quarter = (int)b->limit / 4, limit = quarter + (quarter < FEW_CELLS ? quarter : FEW_CELLS);
-    int total = list_points(b, block, 0, grid, limit, CELLS);
+    int total = list_cells(b, block, 0, grid, limit, CELLS);
     float *c = list_of(b, 0, PHASE_LIST), *s = list_of(b, 0, SINE_LIST), *values = b->lists;
     float *luma = list_of(b, 0, LIGHT_LIST);
     turn_all(total, c, s);
@@ -99,7 +99,7 @@ static void fit_cells(const Blocks *b, const int32_t *order, int some, const Sum
     SmallFits fits;
     fits.rights = 3;
     int harmonics = b->harmonics[order[0]] > 0;
-    fill_fits(&fits, sums, some, harmonics, 1);
+    fill_fits(&fits, sums, some, harmonics, SLOPED);
     solve_fits(&fits);
     for (int l = 0; l < some; l++) {
         Chroma *out = chroma + l;

@@ -120,7 +120,7 @@ static void predict_hue(const Blocks *b, const int32_t *order, int some, SmallFi
     sum_phases(ycc, harmonics, sums);
     find_limit((const Some *)ycc[0], harmonics, limit);
     fits->rights = 2;
-    fill_fits(fits, sums, FITS, harmonics, 0);
+    fill_fits(fits, sums, FITS, harmonics, FLAT);
     solve_fits(fits);
     for (int l = 0; l < some; l++) {
         float *hue = b->hue + (int64_t)order[l] * HUES * HUE;

@@ -24,9 +24,8 @@ _LANES, _STEP = 16, 8
 _LINE = 16
 """Floats of a cache line."""
 _EDGES, _CUBIC, _TERMS, _HUES = 8, 4, 16, 3
-LISTS = 3 + 8 * 7 + 16 + 3 + 4
-"""Lists of pixels: of codes, of eight blocks at a time, and of a cubic fit's columns, its values, and what is read with
-them."""
+LISTS = 3 + 8 * 7 + 16 + 3
+"""Lists of pixels: of codes, of eight blocks at a time, and of a curved fit's columns and what is read with them."""
 TINT = 1 + ROWS + 3
 SUMS = 2 * (2 * HARMONICS + 1) + 4 * (HARMONICS + 1) + 3 + 3 * (ROWS + 2) + 3
 """Floats of `Tint` and `Sums` of blocks.h."""
@@ -53,7 +52,7 @@ class Shared(Workspace):
         *((name, ctypes.c_void_p) for name in ("seen", "harmonics", "frequency", "margin", "gain", "box", "edges")),
         *((name, ctypes.c_void_p) for name in ("surfaces", "look")),
         *((name, ctypes.c_int64) for name in ("limit", "room")),
-        *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "places", "codes", "lists", "hue", "tints")),
+        *((name, ctypes.c_void_p) for name in ("order", "spans", "rows", "steps", "lists", "hue", "tints")),
         *((name, ctypes.c_void_p) for name in ("mean_code", "sums", "gathered")),
         ("planes", ctypes.c_void_p * 3),
         ("stride", ctypes.c_int64 * 3),
@@ -261,8 +260,7 @@ def _prepare_lists(shared: Shared, samples: int) -> None:
         {
             "spans": np.zeros((2, height), np.int32),
             "rows": _aligned((height, _TERMS)),
-            "places": _aligned((3, room)).view(np.int32),
-            "codes": np.zeros((3, room), np.uint16),
+            "steps": np.zeros(room, np.int32),
             "lists": _aligned((LISTS, room)),
         }
     )

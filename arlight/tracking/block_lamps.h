@@ -31,7 +31,7 @@ static HOT int list_columns(int harmonics, const Pixels *p, int64_t room, float 
         out[5 * room + i] = u * u * u, out[6 * room + i] = u * u * v;
         out[7 * room + i] = u * v * v, out[8 * room + i] = v * v * v;
     }
-    return count + 9;
+    return count + CURVED;
 }
 
 /* Products of a list with four others, `room` apart. */
@@ -50,68 +50,53 @@ INLINE void multiply(int total, const float *restrict a, const float *restrict b
         products[k] = sums[k];
 }
 
-/* Products of the columns with each other and with the values, of one fit; lists: columns, then values. */
-static HOT void fill_cubic(SmallFits *f, int l, int total, int64_t room, const float *lists, float squares[CHANNELS])
+/* Products of the last CURVED - SLOPED of a fit's columns with all before them, and with light. The other ones follow
+ * from sums over the block. */
+static HOT void fill_curved(SmallFits *f, int l, int columns, const Pixels *p, int64_t room, const float *lists)
 {
-    int columns = f->columns, all = columns + CHANNELS;
-    for (int i = 0; i < all; i++)
-        for (int j = i; j < all; j += 4) {
-            float products[4];
+    int total = p->total;
+    for (int i = columns - (CURVED - SLOPED); i < columns; i++) {
+        float products[4];
+        for (int j = 0; j <= i; j += 4) {
             multiply(total, lists + i * room, lists + j * room, room, products);
-            for (int k = j; k < j + 4 && k < all; k++) {
-                if (k < columns)
-                    f->normal[k][i][l] = products[k - j];
-                else if (i < columns)
-                    f->right[k - columns][i][l] = products[k - j];
-                else if (k == i)
-                    squares[k - columns] = products[k - j];
-            }
+            for (int k = j; k < j + 4 && k <= i; k++)
+                f->normal[i][k][l] = products[k - j];
         }
+        multiply(total, lists + i * room, p->light, room, products);
+        for (int k = 0; k < CHANNELS; k++)
+            f->right[k][i][l] = products[k];
+    }
 }
 
 /* Blocks of one number of harmonics that wait to be fitted together. */
 typedef struct {
     SmallFits fits;
-    int some, used[FITS]; /* pixels of each */
+    int some;
     int32_t blocks[FITS];
-    float squares[FITS][CHANNELS];
+    Sums sums[FITS];
     double brightest; /* of all blocks so far */
 } Lamps;
-
-/* Makes a fit the same as the first. */
-static void repeat_fit(SmallFits *f, int l)
-{
-    for (int i = 0; i < f->columns; i++) {
-        for (int j = 0; j <= i; j++)
-            f->normal[i][j][l] = f->normal[i][j][0];
-        for (int c = 0; c < f->rights; c++)
-            f->right[c][i][l] = f->right[c][i][0];
-    }
-}
 
 /* Fits the blocks that wait. */
 static void fit_lamps(const Blocks *b, Lamps *lamps)
 {
     if (lamps->some == 0)
         return;
-    for (int l = lamps->some; l < FITS; l++)
-        repeat_fit(&lamps->fits, l);
+    fill_fits(&lamps->fits, lamps->sums, lamps->some, b->harmonics[lamps->blocks[0]], CURVED);
     solve_fits(&lamps->fits);
-    keep_fits(b, &lamps->fits, lamps->blocks, lamps->some, lamps->used, (const float(*)[CHANNELS])lamps->squares);
+    keep_fits(b, &lamps->fits, lamps->blocks, lamps->some, lamps->sums);
     lamps->some = 0;
 }
 
 /* Has a block wait to be fitted with shading of third degree. */
-static void add_lamp(const Blocks *b, int block, const Pixels *p, Lamps *lamps)
+static void add_lamp(const Blocks *b, int block, const Pixels *p, const Sums *sums, Lamps *lamps)
 {
     if (lamps->some == FITS || (lamps->some && b->harmonics[block] != b->harmonics[lamps->blocks[0]]))
         fit_lamps(b, lamps);
     float *lists = b->lists + FIT_LISTS * b->room;
     int l = lamps->some++, columns = list_columns(b->harmonics[block], p, b->room, lists);
-    memcpy(lists + columns * b->room, p->light, (size_t)(CHANNELS * b->room) * sizeof *lists);
-    lamps->fits.columns = columns, lamps->fits.rights = CHANNELS;
-    fill_cubic(&lamps->fits, l, p->total, b->room, lists, lamps->squares[l]);
-    lamps->used[l] = p->total;
+    fill_curved(&lamps->fits, l, columns, p, b->room, lists);
+    lamps->sums[l] = *sums;
     lamps->blocks[l] = block;
 }
 
@@ -121,8 +106,9 @@ static double largest_of(const double *values)
 }
 
 /* Has the blocks wait whose pixels stray from their stripes. What a straight slope leaves is as uneven as the slope. */
-static void find_lamps(const Blocks *b, const int32_t *order, int some, const Pixels *pixels, Lamps *lamps)
+static void find_lamps(const Blocks *b, int at, int some, const Pixels *pixels, Lamps *lamps)
 {
+    const int32_t *order = b->order + at;
     for (int l = 0; l < some; l++)
         lamps->brightest = fmax(lamps->brightest, largest_of(b->values + (int64_t)order[l] * ROWS * CHANNELS));
     double limit = LAMP_DEVIATION * lamps->brightest;
@@ -132,7 +118,7 @@ static void find_lamps(const Blocks *b, const int32_t *order, int some, const Pi
             continue;
         for (int c = 0; c < CHANNELS; c++)
             b->shading[(int64_t)order[l] * CHANNELS + c] += sqrt(variance[c]);
-        add_lamp(b, order[l], pixels + l, lamps);
+        add_lamp(b, order[l], pixels + l, b->sums + at + l, lamps);
     }
 }
 

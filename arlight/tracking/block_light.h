@@ -88,7 +88,7 @@ static HOT int32_t find_places(const Blocks *b, int block, int channel, const Pi
 {
     const Tint *tint = b->tints + block * CHANNELS + channel;
     const float *c = p->cosine, *s = p->sine, *codes = b->lists, *others = codes + b->room;
-    int32_t last = (int32_t)b->entries - 1, *places = b->places;
+    int32_t last = (int32_t)b->entries - 1, *places = table_places(b);
     int harmonics = b->harmonics[block], total = p->total;
     if (b->shift_x == 0 && b->shift_y == 0)
         mix_pixels(total, b->rgb_from_ycc + 3 * channel, last, codes, others, others + b->room, places);
@@ -116,13 +116,13 @@ static HOT void prepare_pixels(const Blocks *b, int block, const Pixels *p)
 static Pixels light_pixels(const Blocks *b, int block, int place, const Grid *grid)
 {
     int what = b->shift_x > 0 || b->shift_y > 0 ? LUMA : ALL_PLANES;
-    int total = list_points(b, block, place, grid, (int)b->limit, what);
+    int total = list_cells(b, block, place, grid, (int)b->limit, what);
     Pixels p = {total, {0}, list_of(b, place, PHASE_LIST), list_of(b, place, SINE_LIST), list_of(b, place, X_LIST),
                 list_of(b, place, Y_LIST), list_of(b, place, LIGHT_LIST)};
     prepare_pixels(b, block, &p);
     for (int c = 0; c < CHANNELS; c++) {
         p.largest[c] = find_places(b, block, c, &p);
-        look_up(b->light, p.total, b->places, p.light + c * b->room);
+        look_up(b->light, p.total, table_places(b), p.light + c * b->room);
         clear_rest(p.light + c * b->room, p.total);
     }
     for (int k = PHASE_LIST; k < LIGHT_LIST; k++)

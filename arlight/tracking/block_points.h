@@ -9,7 +9,7 @@
 enum { PHASE_LIST, SINE_LIST, X_LIST, Y_LIST, LIGHT_LIST, KEPT = LIGHT_LIST + CHANNELS };
 /* Lists there are: values of codes, those of the blocks that are fitted together, and what fits with a curved shading
  * are made of. */
-enum { KEPT_LISTS = CHANNELS, FIT_LISTS = KEPT_LISTS + FITS * KEPT, LISTS = FIT_LISTS + COLUMNS + CHANNELS + 4 };
+enum { KEPT_LISTS = CHANNELS, FIT_LISTS = KEPT_LISTS + FITS * KEPT, LISTS = FIT_LISTS + COLUMNS + 3 };
 
 /* Which of the blocks that are fitted together: where its lists are. */
 INLINE float *list_of(const Blocks *b, int place, int which)
@@ -17,11 +17,19 @@ INLINE float *list_of(const Blocks *b, int place, int which)
     return b->lists + (KEPT_LISTS + place * KEPT + which) * b->room;
 }
 
+/* Room for as many places in the decoding table as a list has, before a fit's columns go there. How far it lies from the
+ * lists that are read meanwhile is always the same: at some distances processors confuse what is written with what is
+ * read. */
+INLINE int32_t *table_places(const Blocks *b)
+{
+    return (int32_t *)(b->lists + FIT_LISTS * b->room);
+}
+
 /* Some neighbours in a list, and their columns. */
 typedef float Vector __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
 typedef int32_t Columns __attribute__((vector_size(4 * STEP), aligned(4), may_alias));
-/* Pairs of codes side by side. */
-typedef uint16_t Pairs1 __attribute__((vector_size(2 * STEP), aligned(1), may_alias));
+/* Codes of two bytes, or pairs of one, and pairs of two. */
+typedef uint16_t Codes2 __attribute__((vector_size(2 * STEP), aligned(1), may_alias));
 typedef uint32_t Pairs2 __attribute__((vector_size(4 * STEP), aligned(1), may_alias));
 
 #define FETCHED_PX 64.0f /* half the size of blocks up to which all of one is brought near: two cache lines a row */
@@ -40,8 +48,8 @@ typedef struct {
     int width, height;          /* cells */
     int together;               /* whether a step can be read at once, but for the last row */
     float left, step;           /* u of the first column, and from one to the next */
-    float *phase, *x, *y, *luma; /* luma: the sum over a cell */
-    char *codes[CHANNELS];
+    float scale[CHANNELS], offset[CHANNELS]; /* value = scale code - offset */
+    float *phase, *x, *y, *values[CHANNELS];
 } Reader;
 
 /* Neighbours in a row. */
@@ -51,11 +59,23 @@ typedef struct {
     const float *terms;   /* (SURFACES, CUBIC) coefficients of u^k; the cubic one matters for the phase alone */
 } Cells;
 
+/* Neighbours' codes. */
+INLINE Columns read_codes(const char *from, int bytes)
+{
+    if (bytes == 2)
+        return __builtin_convertvector(*(const Codes2 *)from, Columns);
+    /* left to itself the compiler widens so few bytes one by one */
+    int32_t a, b;
+    memcpy(&a, from, sizeof a);
+    memcpy(&b, from + sizeof a, sizeof b);
+    return (Columns){a, a, a, a, b, b, b, b} >> (EACH % 4 * 8) & 255;
+}
+
 /* Sums of neighbouring pairs of codes. */
 INLINE Columns sum_pairs(const char *from, int bytes)
 {
     if (bytes == 1) {
-        Pairs1 pairs = *(const Pairs1 *)from;
+        Codes2 pairs = *(const Codes2 *)from;
         return __builtin_convertvector((pairs & 255) + (pairs >> 8), Columns);
     }
     Pairs2 pairs = *(const Pairs2 *)from;
@@ -63,29 +83,27 @@ INLINE Columns sum_pairs(const char *from, int bytes)
 }
 
 /* Lists neighbours, in whole steps or a single one: what is too much is written over by the next. */
-INLINE void list_steps(const Reader *s, Cells cells, int single, int what, int bytes, int down)
+INLINE void list_steps(const Reader *s, const Cells *cells, int single, int what, int bytes, int down)
 {
-    float *phase = s->phase + cells.at, *x = s->x + cells.at, *y = s->y + cells.at, *luma = s->luma + cells.at;
-    int first_plane = what == CELLS, planes = what == LUMA ? 1 : CHANNELS;
-    const char *from[CHANNELS], *pairs = s->from[0] + cells.row * s->stride[0] + 2 * cells.left * bytes;
-    char *codes[CHANNELS];
-    for (int plane = first_plane; plane < planes; plane++) {
-        from[plane] = s->from[plane] + cells.row * s->stride[plane] + cells.left * bytes;
-        codes[plane] = s->codes[plane] + cells.at * bytes;
-    }
-    Vector u = s->left + s->step * __builtin_convertvector(cells.left + EACH, Vector);
-    const float *k = cells.terms, forward = s->step * STEP;
-    for (int i = 0; i < (single ? 1 : cells.count); i += STEP, u += forward) {
+    float *phase = s->phase + cells->at, *x = s->x + cells->at, *y = s->y + cells->at;
+    const char *from[CHANNELS];
+    for (int plane = 0; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+        from[plane] = s->from[plane] + cells->row * s->stride[plane] +
+                      cells->left * (what == CELLS && plane == 0 ? 2 * bytes : bytes);
+    Vector u = s->left + s->step * __builtin_convertvector(cells->left + EACH, Vector);
+    const float *k = cells->terms, forward = s->step * STEP;
+    for (int i = 0; i < (single ? 1 : cells->count); i += STEP, u += forward) {
         *(Vector *)(phase + i) = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
         *(Vector *)(x + i) = k[4] + u * (k[5] + u * k[6]);
         *(Vector *)(y + i) = k[8] + u * (k[9] + u * k[10]);
-        for (int plane = first_plane; plane < planes; plane++)
-            memcpy(codes[plane] + i * bytes, from[plane] + i * bytes, (size_t)(STEP * bytes));
-        if (what == CELLS) {
-            Columns sum = sum_pairs(pairs + 2 * i * bytes, bytes);
-            if (down == 2)
-                sum += sum_pairs(pairs + 2 * i * bytes + s->luma_stride, bytes);
-            *(Vector *)(luma + i) = __builtin_convertvector(sum, Vector);
+        for (int plane = 0; plane < (what == LUMA ? 1 : CHANNELS); plane++) {
+            int paired = what == CELLS && plane == 0;
+            const char *codes = from[plane] + i * bytes * (paired ? 2 : 1);
+            Columns read = paired ? sum_pairs(codes, bytes) : read_codes(codes, bytes);
+            if (paired && down == 2)
+                read += sum_pairs(codes + s->luma_stride, bytes);
+            *(Vector *)(s->values[plane] + cells->at + i) =
+                s->scale[plane] * __builtin_convertvector(read, Vector) - s->offset[plane];
         }
     }
 }
@@ -95,41 +113,35 @@ INLINE int code_at(const char *row, int bytes, int64_t column)
     return bytes == 1 ? ((const uint8_t *)row)[column] : ((const uint16_t *)row)[column];
 }
 
-/* The same where a whole step would leave the plane, and for cells of other shapes. */
-static void list_singly(const Reader *s, Cells cells, int what)
+/* A cell's code, or for CELLS the sum of its pixels' luma. */
+static int code_of(const Reader *s, const Cells *cells, int column, int plane, int what)
 {
-    const float *k = cells.terms;
-    for (int i = 0; i < cells.count; i++) {
-        int column = cells.left + i, at = cells.at + i, sum = 0;
+    const char *row = s->from[plane] + cells->row * s->stride[plane];
+    if (what != CELLS || plane > 0)
+        return code_at(row, s->bytes, column);
+    int sum = 0;
+    for (int j = 0; j < s->down; j++)
+        for (int l = 0; l < s->across; l++)
+            sum += code_at(row + j * s->luma_stride, s->bytes, (int64_t)column * s->across + l);
+    return sum;
+}
+
+/* The same where a whole step would leave the plane, and for cells of other shapes. */
+static void list_singly(const Reader *s, const Cells *cells, int what)
+{
+    const float *k = cells->terms;
+    for (int i = 0; i < cells->count; i++) {
+        int column = cells->left + i, at = cells->at + i;
         float u = s->left + s->step * (float)column;
         s->phase[at] = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
         s->x[at] = k[4] + u * (k[5] + u * k[6]);
         s->y[at] = k[8] + u * (k[9] + u * k[10]);
-        for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-            memcpy(s->codes[plane] + at * s->bytes, s->from[plane] + cells.row * s->stride[plane] + column * s->bytes,
-                   (size_t)s->bytes);
-        for (int j = 0; j < s->down && what == CELLS; j++)
-            for (int l = 0; l < s->across; l++)
-                sum += code_at(s->from[0] + cells.row * s->stride[0] + j * s->luma_stride, s->bytes,
-                               (int64_t)column * s->across + l);
-        s->luma[at] = (float)sum;
+        for (int plane = 0; plane < (what == LUMA ? 1 : CHANNELS); plane++)
+            s->values[plane][at] = s->scale[plane] * (float)code_of(s, cells, column, plane, what) - s->offset[plane];
     }
 }
 
-/* Lists neighbours; the usual ones have code of their own. */
-INLINE void list_some(const Reader *s, Cells cells, int single, int what)
-{
-    /* whole steps may run into the next row of the plane, not beyond the last */
-    if (!s->together || (cells.row + 1 == s->height && cells.left + whole_steps(cells.count) > s->width))
-        list_singly(s, cells, what);
-    else if (what == CELLS && s->bytes == 1)
-        list_steps(s, cells, single, CELLS, 1, s->down);
-    else if (what == LUMA && s->bytes == 1)
-        list_steps(s, cells, single, LUMA, 1, 1);
-    else
-        list_steps(s, cells, single, what, s->bytes, s->down);
-}
-
+/* place: as for `list_of`. */
 static Reader reader_of(const Blocks *b, int block, int place, int what, const Grid *grid)
 {
     int cells = what == CELLS;
@@ -138,12 +150,15 @@ static Reader reader_of(const Blocks *b, int block, int place, int what, const G
                 .down = cells ? (int)grid->step_y : 1, .width = grid->width, .height = grid->height,
                 .left = (grid->first_x - b->box[block]) * scale, .step = grid->step_x * scale,
                 .phase = list_of(b, place, PHASE_LIST), .x = list_of(b, place, X_LIST),
-                .y = list_of(b, place, Y_LIST), .luma = list_of(b, place, LIGHT_LIST)};
+                .y = list_of(b, place, Y_LIST)};
     s.together = grid->width >= 2 * STEP && (!cells || (s.across == 2 && s.down <= 2));
     for (int plane = 0; plane < CHANNELS; plane++) {
+        int summed = cells && plane == 0;
         s.from[plane] = b->planes[plane];
         s.stride[plane] = b->stride[plane] * (plane == 0 ? s.down : 1);
-        s.codes[plane] = b->codes + plane * b->room * s.bytes;
+        s.scale[plane] = (float)b->scale[plane] / (float)(summed ? s.across * s.down : 1);
+        s.offset[plane] = (float)(b->offset[plane] * b->scale[plane]);
+        s.values[plane] = summed ? list_of(b, place, LIGHT_LIST) : b->lists + (plane - cells) * b->room;
     }
     return s;
 }
@@ -161,52 +176,55 @@ INLINE void expand_rows(const Blocks *b, int block, const Grid *grid, const Span
     }
 }
 
-/* Fills the lists of phase, x, y and of the planes' codes, for CELLS also that of their luma's sums. Returns how many
- * cells there are. */
-static HOT int list_cells(const Blocks *b, int block, int place, const Grid *grid, const Span *span, int what)
+/* Lists neighbours; single: of one step. */
+INLINE void list_some(const Reader *s, const Cells *cells, int single, int what, int bytes, int down)
 {
-    expand_rows(b, block, grid, span);
-    Reader s = reader_of(b, block, place, what, grid);
+    /* whole steps may run into the next row of the plane, not beyond the last */
+    if (!s->together || (cells->row + 1 == s->height && cells->left + whole_steps(cells->count) > s->width))
+        list_singly(s, cells, what);
+    else
+        list_steps(s, cells, single, what, bytes, down);
+}
+
+/* Lists the cells of all rows, or of those steps of theirs that were chosen. Returns how many there are. */
+INLINE int list_rows(const Blocks *b, const Reader *s, const Span *span, int what, int bytes, int down)
+{
     Cells cells = {.at = 0};
     for (int r = 0, first = 0, next = 0; r < span->rows; r++) {
-        int steps = whole_steps(span->count[r]) / STEP;
-        cells.row = span->first_row + r, cells.left = span->left[r], cells.count = span->count[r];
+        int left = span->left[r], count = span->count[r], steps = whole_steps(count) / STEP;
+        cells.row = span->first_row + r, cells.left = left, cells.count = count;
         cells.terms = b->rows + r * TERMS;
         if (span->chosen < 0) {
-            list_some(&s, cells, 0, what);
-            cells.at += cells.count;
+            list_some(s, &cells, 0, what, bytes, down);
+            cells.at += count;
         }
         for (; next < span->chosen && span->steps[next] < first + steps; next++) {
-            Cells chosen = cells;
             int passed = (span->steps[next] - first) * STEP, most = span->total - cells.at;
-            chosen.left += passed;
-            chosen.count = cells.count - passed < STEP ? cells.count - passed : STEP;
-            chosen.count = chosen.count < most ? chosen.count : most;
-            list_some(&s, chosen, 1, what);
-            cells.at += chosen.count;
+            cells.left = left + passed;
+            cells.count = count - passed < STEP ? count - passed : STEP;
+            cells.count = cells.count < most ? cells.count : most;
+            list_some(s, &cells, 1, what, bytes, down);
+            cells.at += cells.count;
         }
         first += steps;
     }
     return cells.at;
 }
 
-/* A list of codes as values. */
-INLINE void convert(int total, const void *codes, int bytes, float offset, float scale, float *restrict values)
+/* Lists the cells of a block, `limit` at most: phase, x, y and the planes' values; for CELLS those of Cb and Cr, and
+ * their mean luma in the list of light. The usual ones have code of their own. Returns how many there are. */
+static HOT int list_cells(const Blocks *b, int block, int place, const Grid *grid, int limit, int what)
 {
-    int steps = (total + STEP - 1) & -STEP;
-    for (int i = 0; i < steps; i++)
-        values[i] = scale * (float)(bytes == 1 ? ((const uint8_t *)codes)[i] : ((const uint16_t *)codes)[i]) - offset;
-}
-
-/* Converts the codes of one plane. */
-static HOT void convert_codes(const Blocks *b, int plane, int total, float *values)
-{
-    float scale = (float)b->scale[plane], offset = (float)(b->offset[plane] * b->scale[plane]);
-    const char *codes = b->codes + plane * b->room * b->bytes;
-    if (b->bytes == 1)
-        convert(total, codes, 1, offset, scale, values);
-    else
-        convert(total, codes, 2, offset, scale, values);
+    Span span = span_of(b, block, grid);
+    if (span.total > limit)
+        thin_out(&span, limit);
+    expand_rows(b, block, grid, &span);
+    Reader s = reader_of(b, block, place, what, grid);
+    if (what == CELLS && s.bytes == 1 && s.down == 2)
+        return list_rows(b, &s, &span, CELLS, 1, 2);
+    if (what == LUMA && s.bytes == 1)
+        return list_rows(b, &s, &span, LUMA, 1, 1);
+    return list_rows(b, &s, &span, what, s.bytes, s.down);
 }
 
 /* Fetches one plane's part of a box of pixels, given by its middle and half its size. */
@@ -232,27 +250,6 @@ INLINE void fetch_block(const Blocks *b, int block, int planes)
         return;
     for (int plane = 0; plane < planes; plane++)
         fetch_rows(b, plane, box);
-}
-
-/* Lists the cells of a block, `limit` at most, and the planes' values; for CELLS Cb and Cr, and their mean luma in the
- * list of light. Returns how many there are. */
-static HOT int list_points(const Blocks *b, int block, int place, const Grid *grid, int limit, int what)
-{
-    Span span = span_of(b, block, grid);
-    if (span.total > limit)
-        thin_out(&span, limit);
-    int total = list_cells(b, block, place, grid, &span, what);
-    float *values = b->lists;
-    for (int plane = what == CELLS; plane < (what == LUMA ? 1 : CHANNELS); plane++)
-        convert_codes(b, plane, total, values + (plane - (what == CELLS)) * b->room);
-    if (what != CELLS)
-        return total;
-    float *luma = list_of(b, place, LIGHT_LIST), scale = (float)b->scale[0] / (grid->step_x * grid->step_y);
-    float offset = (float)(b->offset[0] * b->scale[0]);
-    int steps = whole_steps(total) & -STEP;
-    for (int i = 0; i < steps; i++)
-        luma[i] = luma[i] * scale - offset;
-    return total;
 }
 
 /* Clears what stands behind the list up to a whole step. */

@@ -33,26 +33,26 @@ static void average_look(const Blocks *b, int block, const Sums *sums)
     b->cosine[block] = mean[1];
 }
 
-/* Writes some blocks' fits out. used: pixels of each; squares: of their values. */
-static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *order, int some, const int *used,
-                      const float (*squares)[CHANNELS])
+/* Writes some blocks' fits out. */
+static void keep_fits(const Blocks *b, const SmallFits *fits, const int32_t *order, int some, const Sums *sums)
 {
     int kept = 1 + 2 * b->harmonics[order[0]];
     for (int l = 0; l < some; l++) {
         int64_t block = order[l];
+        int used = (int)sums[l].cosine[0];
         double *values = b->values + block * ROWS * CHANNELS, *covariance = b->covariance + block * ROWS * ROWS;
         memset(values, 0, ROWS * CHANNELS * sizeof *values);
         memset(covariance, 0, ROWS * ROWS * sizeof *covariance);
         memset(b->variance + block * CHANNELS, 0, CHANNELS * sizeof *values);
         b->samples[block] = 0;
-        if (used[l] < 2 * fits->columns || fits->regular[l] == 0.0)
+        if (used < 2 * fits->columns || fits->regular[l] == 0.0)
             continue;
-        b->samples[block] = used[l];
+        b->samples[block] = used;
         for (int c = 0; c < CHANNELS; c++) {
             for (int i = 0; i < kept; i++)
                 values[i * CHANNELS + c] = fits->solved[c][i][l];
-            double left = squares[l][c] - fits->explained[c][l];
-            b->variance[block * CHANNELS + c] = fmax(left, 0.0) / (used[l] - fits->columns);
+            double left = sums[l].squares[c] - fits->explained[c][l];
+            b->variance[block * CHANNELS + c] = fmax(left, 0.0) / (used - fits->columns);
         }
         for (int i = 0; i < kept; i++)
             for (int j = 0; j <= i; j++)

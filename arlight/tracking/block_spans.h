@@ -87,7 +87,7 @@ static Span span_of(const Blocks *b, int block, const Grid *grid)
     int first = (int)ceilf((middle - half) / grid->step_y), last = (int)floorf((middle + half) / grid->step_y);
     first = first > 0 ? first : 0;
     last = last < grid->height - 1 ? last : grid->height - 1;
-    Span span = {first, last - first + 1, b->spans, b->spans + b->height, 0, -1, b->places};
+    Span span = {first, last - first + 1, b->spans, b->spans + b->height, 0, -1, b->steps};
     if (span.rows <= 0) {
         span.rows = 0;
         return span;

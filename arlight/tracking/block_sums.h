@@ -5,6 +5,9 @@
 #include "blocks.h"
 #include "small_fit.h"
 
+/* How many columns describe a block's shading: x, y, and their powers up to the third. */
+enum { FLAT = 0, SLOPED = 2, CURVED = 9 };
+
 /* How many of the blocks from `at` on have one number of harmonics, FITS at most. */
 static int alike(const Blocks *b, int at, int count)
 {
@@ -147,16 +150,17 @@ INLINE void fill_shading(SmallFits *f, const Sums *sums, int some, int harmonics
             f->right[k][waves + i] = gather_sums(sums, some, sums->right[k] + ROWS + i);
 }
 
-/* Normal equations of some blocks' sums: columns 1, cos 1, sin 1, ..., and x, y where there is shading. */
+/* Normal equations of some blocks' sums: columns 1, cos 1, sin 1, ..., then x, y unless the shading is FLAT. What is
+ * CURVED is filled by itself. */
 static HOT void fill_fits(SmallFits *f, const Sums *sums, int some, int harmonics, int shading)
 {
     int waves = 2 * harmonics + 1;
-    f->columns = waves + (shading ? 2 : 0);
+    f->columns = waves + shading;
     fill_waves(f, sums, some, harmonics);
     for (int k = 0; k < f->rights; k++)
         for (int i = 0; i < waves; i++)
             f->right[k][i] = gather_sums(sums, some, sums->right[k] + i);
-    if (shading)
+    if (shading != FLAT)
         fill_shading(f, sums, some, harmonics);
 }
 

@@ -48,20 +48,14 @@ static void infer_colour(const Blocks *b, int count)
     }
 }
 
-/* Fits some blocks together; pixels: as their lists hold them. */
-static void fit_blocks(const Blocks *b, int at, int some, const Pixels *pixels)
+/* Fits some blocks together, after their sums. */
+static void fit_blocks(const Blocks *b, int at, int some)
 {
     SmallFits fits;
-    int used[FITS];
-    float squares[FITS][CHANNELS];
     fits.rights = CHANNELS;
-    fill_fits(&fits, b->sums + at, some, b->harmonics[b->order[at]], 1);
-    for (int l = 0; l < some; l++) {
-        used[l] = pixels[l].total;
-        memcpy(squares[l], b->sums[at + l].squares, sizeof squares[l]);
-    }
+    fill_fits(&fits, b->sums + at, some, b->harmonics[b->order[at]], SLOPED);
     solve_fits(&fits);
-    keep_fits(b, &fits, b->order + at, some, used, (const float(*)[CHANNELS])squares);
+    keep_fits(b, &fits, b->order + at, some, b->sums + at);
     keep_slopes(b, &fits, b->order + at, some);
 }
 
@@ -70,7 +64,7 @@ static void fit_all(const Blocks *b, int whites, int count)
 {
     Grid grid = grid_of(b, 0);
     White white = {0};
-    Lamps lamps = {.brightest = 1e-6};
+    Lamps lamps = {.fits.rights = CHANNELS, .brightest = 1e-6};
     Pixels pixels[FITS];
     int planes = b->shift_x > 0 || b->shift_y > 0 ? 1 : CHANNELS;
     for (int at = 0, some; at < count; at += some) {
@@ -81,8 +75,8 @@ static void fit_all(const Blocks *b, int whites, int count)
             fetch_block(b, b->order[at + l + AHEAD < count ? at + l + AHEAD : count - 1], planes);
             pixels[l] = usable_pixels(b, at + l, l, &grid, &white);
         }
-        fit_blocks(b, at, some, pixels);
-        find_lamps(b, b->order + at, some, pixels, &lamps);
+        fit_blocks(b, at, some);
+        find_lamps(b, at, some, pixels, &lamps);
     }
     fit_lamps(b, &lamps);
 }

@@ -58,8 +58,7 @@ typedef struct {
     int32_t *order;        /* (n) blocks to be measured: white ones first, then by harmonics */
     int32_t *spans;        /* (2, height) first pixel of a row, and how many */
     float *rows;           /* (height, TERMS) coefficients in each row; also limits (2, height) */
-    int32_t *places;       /* (CHANNELS, room) */
-    char *codes;           /* (CHANNELS, room) of 2 bytes at most */
+    int32_t *steps;        /* (room) that were chosen of a block's */
     float *lists;          /* (LISTS, room) */
     float *hue;            /* (n, HUES, HUE) of Cb and Cr; most luma that chroma is scaled with, and least over most */
     Tint *tints;           /* (n, CHANNELS) */
