@@ -128,8 +128,9 @@ static HOT void set_equation(const TypicalError *typical, int channel, const dou
     typical->equation[0] += (float)(free * precision[0] * precision[0]);
 }
 
-/* Innovation of one channel as each number alone should take it: what the whole vector takes, P y, over the number's own
-   gain. `weight` is y, the distance divided by its covariance, times the shares; `freed` what the level takes beside. */
+/* Innovation of one channel as each number alone should take it: what the whole vector takes, P y, over the number's
+   own gain. `weight` is y, the distance divided by its covariance, times the shares; `freed` is what the level takes
+   beside. */
 static HOT void spread_innovation(const TypicalError *typical, int channel, const double *restrict variance,
                                   double freed, const double *restrict share, const double *restrict weight,
                                   double *restrict innovation)
