@@ -82,8 +82,8 @@ INLINE Columns sum_pairs(const char *from, int bytes)
     return (Columns)((pairs & 65535) + (pairs >> 16));
 }
 
-/* Lists neighbours, in whole steps or a single one: what is too much is written over by the next. */
-INLINE void list_steps(const Reader *s, const Cells *cells, int single, int what, int bytes, int down)
+/* Lists neighbours in whole steps: what is too much is written over by the next. */
+INLINE void list_steps(const Reader *s, const Cells *cells, int what, int bytes, int down)
 {
     float *phase = s->phase + cells->at, *x = s->x + cells->at, *y = s->y + cells->at;
     const char *from[CHANNELS];
@@ -92,7 +92,7 @@ INLINE void list_steps(const Reader *s, const Cells *cells, int single, int what
                       cells->left * (what == CELLS && plane == 0 ? 2 * bytes : bytes);
     Vector u = s->left + s->step * __builtin_convertvector(cells->left + EACH, Vector);
     const float *k = cells->terms, forward = s->step * STEP;
-    for (int i = 0; i < (single ? 1 : cells->count); i += STEP, u += forward) {
+    for (int i = 0; i < cells->count; i += STEP, u += forward) {
         *(Vector *)(phase + i) = k[0] + u * (k[1] + u * (k[2] + u * k[3]));
         *(Vector *)(x + i) = k[4] + u * (k[5] + u * k[6]);
         *(Vector *)(y + i) = k[8] + u * (k[9] + u * k[10]);
@@ -176,14 +176,14 @@ INLINE void expand_rows(const Blocks *b, int block, const Grid *grid, const Span
     }
 }
 
-/* Lists neighbours; single: of one step. */
-INLINE void list_some(const Reader *s, const Cells *cells, int single, int what, int bytes, int down)
+/* Lists neighbours. */
+INLINE void list_some(const Reader *s, const Cells *cells, int what, int bytes, int down)
 {
     /* whole steps may run into the next row of the plane, not beyond the last */
     if (!s->together || (cells->row + 1 == s->height && cells->left + whole_steps(cells->count) > s->width))
         list_singly(s, cells, what);
     else
-        list_steps(s, cells, single, what, bytes, down);
+        list_steps(s, cells, what, bytes, down);
 }
 
 /* Lists the cells of all rows, or of those steps of theirs that were chosen. Returns how many there are. */
@@ -195,7 +195,7 @@ INLINE int list_rows(const Blocks *b, const Reader *s, const Span *span, int wha
         cells.row = span->first_row + r, cells.left = left, cells.count = count;
         cells.terms = b->rows + r * TERMS;
         if (span->chosen < 0) {
-            list_some(s, &cells, 0, what, bytes, down);
+            list_some(s, &cells, what, bytes, down);
             cells.at += count;
         }
         for (; next < span->chosen && span->steps[next] < first + steps; next++) {
@@ -203,7 +203,7 @@ INLINE int list_rows(const Blocks *b, const Reader *s, const Span *span, int wha
             cells.left = left + passed;
             cells.count = count - passed < STEP ? count - passed : STEP;
             cells.count = cells.count < most ? cells.count : most;
-            list_some(s, &cells, 1, what, bytes, down);
+            list_some(s, &cells, what, bytes, down);
             cells.at += cells.count;
         }
         first += steps;
