@@ -51,12 +51,12 @@ class PlaneShader:
         """What the object leaves of every pixel's light: the ratio at the point of the plane that it sees.
 
         Args:
-            region: pixels of the frame, as `Frame.dimmed` takes it.
+            region: pixels of the frame, as a `Shade` covers them.
             camera_from_probe: the pose.
             ratio: (side, side, 4) irradiance with the object over irradiance without, and an unused column.
 
         Returns:
-            (3, rows, columns) at every 4th pixel, as `Frame.dimmed` takes it; 1 where no point of the map is seen.
+            (3, rows, columns) at every 4th pixel, as a `Shade` has it; 1 where no point of the map is seen.
         """
         rotation, plane = camera_from_probe.rotation, self._plane
         if ratio.shape != (plane.side, plane.side, 4):

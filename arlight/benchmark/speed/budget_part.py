@@ -32,18 +32,23 @@ class _JudgedPipeline:
     """A pipeline that keeps some of its results."""
 
     pipeline: Pipeline
+    """What is judged."""
     kept: list[tuple[Frame, FrameResult]] = field(default_factory=list)
+    """Frames and what was made of them."""
 
     def estimate(self, frame: Frame) -> FrameEstimate:
+        """As the pipeline's."""
         return self.pipeline.estimate(frame)
 
     def relight(self, frame: Frame, estimate: FrameEstimate) -> FrameResult:
+        """As the pipeline's; once in a while the result is kept."""
         result = self.pipeline.relight(frame, estimate)
         if frame.index >= _SETTLED and frame.index % _JUDGED_EVERY == 0:
             self.kept.append((frame, result))
         return result
 
     def release(self) -> None:
+        """As the pipeline's."""
         self.pipeline.release()
 
 

@@ -72,6 +72,7 @@ class _CornerPose:
         self._camera = camera
 
     def pose(self, ids: Sequence[int], corners_px: Sequence[Any]) -> Pose | None:
+        """Of markers by number and their corners (4, 2) in the picture; None where none is the sheet's."""
         own = [
             (self._corners_mm[i], corners) for i, corners in zip(ids, corners_px, strict=True) if i in self._corners_mm
         ]
