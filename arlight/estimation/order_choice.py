@@ -9,13 +9,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.estimation.drawn_light import DrawnLight
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.shown_light import Need, ShownLight
 
 _LOOK_EVERY_S = 2.0
 """Time after which all orders are measured once more [s]."""
 _JUDGE_EVERY_S = 0.8
-"""Time between two frames in which the order is thought over, half of it where a lower one may do [s]."""
+"""Time between two frames in which the order is thought over, half of it where a lower one may do, and less while
+little has been seen [s]."""
 _WATCH_EVERY_S = 0.15
 """Time between two frames in which light of a lower order is compared with what it was [s]."""
 _STANDS_OUT = 4.0
@@ -23,8 +25,6 @@ _STANDS_OUT = 4.0
 all orders to be followed again; twice as many after every time that it was in vain."""
 _LOWER_AFTER_S = 0.8
 """Time for which a lower order must have sufficed before it is taken [s]."""
-_FADE_S = 0.5
-"""Time in which orders come and go, so that no frame differs visibly from the last [s]."""
 _KEPT = 0.95
 """Of the most that frames showed, from one time that the order is thought over to the next."""
 _STEP = 0.5
@@ -41,16 +41,18 @@ class OrderChoice:
 
     def __init__(self, frequencies: NDArray[np.int64], need: Need) -> None:
         self._light = ShownLight(frequencies, need)
+        self._drawn = DrawnLight(len(need.independent))
         self.highest, self._tolerance = self._light.highest, need.tolerance
         self.reset()
 
     def reset(self) -> None:
         """Forget the light."""
         self._light.reset()
+        self._drawn.reset()
         self.order = self.highest
         """Highest order that is followed."""
-        self._core, self._share, self._leaving = self.highest, 1.0, False
-        self._learnt_s = -math.inf
+        self._core, self._leaving = self.highest, False
+        self._learnt_s = self._began_s = -math.inf
         self._left_out = 0.0
         self._doubt = _STANDS_OUT
         self._rose = False
@@ -72,39 +74,37 @@ class OrderChoice:
         if len(seen.frequencies) > len(filtered.frequencies):
             self._looked_s = time_s
             self._look(seen)
-        if self._share < 1.0 or self._leaving:
+        if self._leaving or filtered.order != self.order:
             return
         if self.order < self.highest and not 0.0 <= time_s - self._watched_s < _WATCH_EVERY_S:
             self._watched_s = time_s
             self._watch(filtered)
+            if filtered.order < self.order:
+                return
         soon = 0.5 if math.isfinite(self._fits_since_s) else 1.0
-        if not 0.0 <= time_s - self._judged_s < soon * _JUDGE_EVERY_S:
+        if not 0.0 <= time_s - self._judged_s < min(soon * _JUDGE_EVERY_S, time_s - self._began_s):
+            self._began_s = time_s if math.isinf(self._began_s) else self._began_s
             self._judged_s = time_s
             self._judge(seen, filtered, time_s)
 
     def shown(self, filtered: Lighting) -> Lighting:
-        """The filtered lighting, of which orders that come or go are there in part; error bars as they were."""
+        """The filtered lighting as it is drawn: less of what is hardly known, and of orders that come or go."""
         if filtered.order > self.order:
             filtered = filtered.truncated(self.order)
-        return self._light.in_part(filtered, self._core, self._share)
+        return self._light.drawn(filtered, self._drawn)
 
     def _fade(self, time_s: float) -> None:
-        """Let the orders beyond the core come or go by what they may since the last frame."""
-        step = min(max(time_s - self._learnt_s, 0.0) / _FADE_S, 1.0)
+        """Let what is drawn change by what it may since the last frame."""
+        self._drawn.wait(time_s - self._learnt_s)
         self._learnt_s = time_s
-        self._share = min(max(self._share - step if self._leaving else self._share + step, 0.0), 1.0)
-        if self._leaving and self._share == 0.0:
+        if self._leaving and self._drawn.settled:
             self.order, self._leaving = self._core, False
-        elif not self._leaving and self._share == 1.0:
-            self._core = self.order
 
     def _watch(self, filtered: Lighting) -> None:
         """Follow all orders again if the light is no longer that for which some were left out.
 
         One frame would hardly tell: what a second of them averages may be far below the noise of each.
         """
-        if filtered.order < self.order:
-            return
         strength = self._light.strength(filtered)
         change, larger = abs(strength - self._strength), max(strength, self._strength)
         if change > _STEP * larger and change > self._doubt * self._unsure:
@@ -113,7 +113,8 @@ class OrderChoice:
     def _rise(self) -> None:
         """Follow all orders, to be seen little by little."""
         self.order, self._left_out, self._fits_since_s, self._rose = self.highest, 0.0, math.inf, True
-        self._share, self._leaving = 0.0, False
+        # what the filter makes of them is not known yet
+        self._leaving, self._began_s, self._judged_s = False, -math.inf, -math.inf
 
     def _look(self, seen: Lighting) -> None:
         """Follow all orders again if one frame shows more of them than any did before they were left out.
@@ -129,7 +130,8 @@ class OrderChoice:
         """Leave orders out when a lower one has sufficed for a while, by what the filter has made of the noise."""
         if len(seen.frequencies) == len(filtered.frequencies):
             self._usual = np.maximum(_KEPT * self._usual, self._light.beyond(seen))
-        squared_error = self._light.squared_errors(filtered)[: self.order + 1]
+        self._light.take_in(filtered)
+        squared_error = self._light.squared_errors(filtered)
         most = (1.0 + self._tolerance) ** 2 * squared_error.min() - self._left_out
         lowest = int(np.argmax(squared_error <= most)) if most >= squared_error.min() else self.order
         if lowest >= self.order:
@@ -143,4 +145,5 @@ class OrderChoice:
             self._doubt *= 2.0 if self._rose else 1.0
             self._strength, self._unsure = self._light.strength(filtered.truncated(lowest)), float(squared_error.min())
             self._fits_since_s, self._rose = math.inf, False
-            self._core, self._share, self._leaving = lowest, 1.0, True
+            self._core, self._leaving = lowest, True
+        self._drawn.pass_to(self._light.weights(filtered, self._core if self._leaving else self.order))

@@ -2,14 +2,14 @@
 
 Light is a sum of independent parts of unit variance, relative to its level, of which the first k make the coefficients
 up to an order (a triangular factor of natural light's covariance). What is measured of them are parts z with errors of
-covariance C, so the best guess at them and its covariance are
+covariance C, so the best guess at them, which is drawn, and its covariance are
 
     m = (1 + C)^-1 z,     V = 1 - (1 + C)^-1
 
-What an object shows is linear in the parts; Q is the squared change of the picture. Light shown up to an order K, as it
-was measured, is then expected to be wrong by
+What an object shows is linear in the parts; Q is the squared change of the picture. The guess shown up to an order K is
+then expected to be wrong by
 
-    error^2(K) = (z_K - m)^T Q (z_K - m) + tr(Q V),     z_K the parts up to K and zeros beyond
+    error^2(K) = (m_K - m)^T Q (m_K - m) + tr(Q V),     m_K the parts up to K and zeros beyond
 """
 
 import math
@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from arlight.estimation.drawn_light import DrawnLight
 from arlight.estimation.lighting import Lighting
 from arlight.fourier import frequency_order, pack_real, unpack_real
 
@@ -27,9 +28,9 @@ _OF_STATED = 0.07
 """Share of the stated variance that pictures show. Over the benchmark's clips, whose truth is known, it was 0.07 to 1:
 error bars allow for errors that a clip need not have. The least of them, because an order that is noise is less of a
 loss than one that is missing."""
-_UNEVEN = 4.0
-"""Mean square of the parts of an order, or toward a lamp, over that of all parts of a light: captured light has up to
-twice the amplitude in one order that it has on the whole."""
+_UNEVEN = 7.0
+"""Mean square of the parts of an order, or toward a lamp, over that of all parts of a light: up to ten in captured
+light that comes from the side."""
 _STEPS = 8
 """Steps toward the likeliest strength each time that the order is thought over."""
 _DARKEST = 1e-3
@@ -74,12 +75,15 @@ class ShownLight:
         """Forget how strong the light was."""
         self._model = 1.0, 1.0
 
-    def squared_errors(self, filtered: Lighting) -> Array:
-        """(order + 1,) expected squared error of what is shown with the light up to an order."""
+    def take_in(self, filtered: Lighting) -> None:
+        """Learn how strong the light is."""
         parts, stated = self._parts_of(filtered), self._covariance_of(filtered)
-        n, uncertain = len(parts), np.float32(_OF_STATED) * stated
         self._model = _likeliest(np.mean(parts**2, axis=1)[1:], np.diag(stated)[1:], *self._model)
-        strength = np.float32(_UNEVEN * self._model[0])
+
+    def squared_errors(self, filtered: Lighting) -> Array:
+        """(order + 1,) expected squared error of what is shown with the light up to an order, as it was measured."""
+        parts, uncertain = self._parts_of(filtered), np.float32(_OF_STATED) * self._covariance_of(filtered)
+        n, strength = len(parts), np.float32(self._strength)
         shown, one = self._shown[:n, :n], np.eye(n, dtype=np.float32)
         kept = np.linalg.inv(one + uncertain / strength)
         guess = np.asarray(kept @ parts, np.float32)
@@ -108,15 +112,23 @@ class ShownLight:
         parts = self._parts_of(lighting)[1:]
         return float(np.mean(parts**2, axis=1) @ np.diag(self._shown)[1 : 1 + len(parts)])
 
-    def in_part(self, lighting: Lighting, core: int, share: float) -> Lighting:
-        """A lighting of which the orders beyond `core` are there by a share; error bars as they were."""
-        first, n = self._ends[core], 2 * len(lighting.frequencies) - 1
-        if share == 1.0 or n <= first:
-            return lighting
-        packed = pack_real(lighting.coefficients)
-        beyond = self._parts[first:n, :n] @ packed / self._independent[0, 0]
-        hidden = (1.0 - share) * (self._independent[:n, first:n] @ beyond)
-        return replace(lighting, coefficients=unpack_real(packed - hidden))
+    def weights(self, filtered: Lighting, order: int) -> Array:
+        """(m, m) that make real-packed coefficients to be drawn of measured ones, of the likeliest parts to an order."""
+        n, weights = int(self._ends[order]), np.eye(int(self._ends[order]), dtype=np.float32)
+        uncertain = self._covariance_of(filtered)[1:n, 1:n] * np.float32(_OF_STATED / self._strength)
+        # the level is known, not one of many
+        weights[1:, 1:] = np.linalg.inv(weights[1:, 1:] + uncertain)
+        to_parts = self._parts[:n].astype(np.float32) / np.float32(self._independent[0, 0])
+        return np.asarray(self._independent[:, :n] @ (weights @ to_parts).astype(float))
+
+    def drawn(self, lighting: Lighting, drawn: DrawnLight) -> Lighting:
+        """A lighting as it is drawn; error bars as they were."""
+        return replace(lighting, coefficients=unpack_real(drawn.weighed(pack_real(lighting.coefficients))))
+
+    @property
+    def _strength(self) -> float:
+        """Mean square of the strongest parts."""
+        return _UNEVEN * self._model[0]
 
     def _up_to(self, parts: NDArray[np.float32], order: int) -> NDArray[np.float32]:
         kept = parts.copy()

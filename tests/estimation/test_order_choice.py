@@ -167,16 +167,26 @@ def test_orders_come_and_go_little_by_little() -> None:
     assert 0.0 < max(steps) < 0.1 * most
 
 
-def test_lighting_is_shown_as_it_is_once_the_order_has_settled() -> None:
+def test_lighting_that_is_well_known_is_shown_as_it_is_once_the_order_has_settled() -> None:
     choice = OrderChoice(FREQUENCIES, need([1.0] * 5))
-    settled(choice, RICH, 0.003)
-    light = lighting(RICH, 0.003)
-    assert choice.shown(light) is light
+    settled(choice, RICH, 1e-5)
+    light = lighting(RICH, 1e-5)
+    np.testing.assert_allclose(choice.shown(light).coefficients, light.coefficients, atol=1e-4)
     settled(choice, SOFT, 0.02, 100, 100.0)
-    light = lighting(SOFT, 0.003).truncated(choice.order)
-    assert choice.shown(light) is light
     # a look at all orders is not shown
-    assert choice.shown(lighting(SOFT, 0.003)).order == choice.order
+    assert choice.shown(lighting(SOFT, 0.003)).order == choice.order < 4
+
+
+def test_what_is_hardly_known_is_shown_closer_to_the_truth_than_it_was_measured() -> None:
+    choice = OrderChoice(FREQUENCIES, need([1.0, 1.0, 1.0, 1.0, 1e-4], tolerance=0.0))
+    settled(choice, RICH, 0.02)
+    true = lighting(RICH, 0.0).truncated(choice.order).coefficients
+    measured = [lighting(RICH, 0.02, seed, choice.order) for seed in range(10)]
+    shown, as_it_was = (
+        np.sqrt(np.mean([np.abs(light.coefficients - true) ** 2 for light in lights]))
+        for lights in ([choice.shown(light) for light in measured], measured)
+    )
+    assert shown < as_it_was
 
 
 def test_orders_at_the_edge_of_being_needed_do_not_flicker() -> None:
