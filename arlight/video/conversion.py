@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.native import library
+from arlight.native import address, library
 from arlight.video.curves import IDENTITY, TABLE_SIZE, Curve, decoding_table, encoding_table
 from arlight.video.layout import POINTERS, BoxBounds, CurveTable, LayerOfLight, Layout, PictureCodes, layout_of
 from arlight.video.pixel_format import LUMA_WEIGHTS, PixelFormat, colour_format
@@ -110,7 +110,7 @@ def cover(planes: Planes, format_: PixelFormat, box: Box, over: FloatImage) -> N
     if min(box[2] - box[0], box[3] - box[1]) == 0:
         return
     around = _with_shared_chroma(box, planes[0].shape, format_)
-    before, rows = _rows_before(planes, format_, around)
+    before, copies = _codes_before(planes, format_, around)
     scratch = _scratch(around, _COMPOSING_LINES)
     spans = np.empty((around[3] - around[1], 2), np.int32)
     _composition.cover_picture(
@@ -118,22 +118,20 @@ def cover(planes: Planes, format_: PixelFormat, box: Box, over: FloatImage) -> N
         byref(LayerOfLight(over.ctypes.data, BoxBounds(*box))), byref(BoxBounds(*around)), spans.ctypes.data,
         scratch.ctypes.data,
     )  # fmt: skip
-    del rows
+    del copies
 
 
-def _rows_before(planes: Planes, format_: PixelFormat, box: Box) -> tuple[PictureCodes, Planes]:
-    """A copy of the rows that a region's colour is read from, told as if it were all of the picture, and its memory."""
-    _, first, _, end = _with_shared_chroma(box, planes[0].shape, format_)
-    shift = format_.chroma_shift[1]
-    tops = (first, first >> shift, first >> shift)
-    rows = tuple(
-        plane[top : top + ((end - first) >> (shift if k else 0)) + 1].copy()
-        for k, (plane, top) in enumerate(zip(planes, tops, strict=True))
-    )
-    codes = PictureCodes.of(rows)
-    for k, top in enumerate(tops):
-        codes.planes[k] -= top * codes.strides[k]
-    return codes, rows
+def _codes_before(planes: Planes, format_: PixelFormat, box: Box) -> tuple[PictureCodes, Planes]:
+    """A copy of what a region's colour is read from, told as if it were all of the picture, and its memory."""
+    left, top, right, bottom = _with_shared_chroma(box, planes[0].shape, format_)
+    codes, copies = PictureCodes(), []
+    for k, plane in enumerate(planes):
+        across, down = format_.chroma_shift if k else (0, 0)
+        x, y = left >> across, top >> down
+        copies.append(plane[y : (bottom >> down) + 1, x : (right >> across) + 1].copy())
+        codes.strides[k] = copies[k].strides[0]
+        codes.planes[k] = address(copies[k], plane.dtype.type) - y * codes.strides[k] - x * plane.itemsize
+    return codes, tuple(copies)
 
 
 def converted(planes: Planes, format_: PixelFormat, target: PixelFormat) -> Planes:

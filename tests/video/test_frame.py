@@ -154,6 +154,21 @@ def test_what_is_written_does_not_depend_on_the_region_around_it(name):
     assert same_codes(frame.with_linear_rgb(small, new), frame.with_linear_rgb(large, around))
 
 
+@pytest.mark.parametrize("shift", [(1, 1), (2, 0), (2, 2)])
+@pytest.mark.parametrize("size", [(61, 45), (34, 27)])
+def test_nor_on_how_much_of_the_picture_is_covered(size, shift):
+    """Anywhere, also at edges that cut a chroma sample short: what has no coverage is as good as outside."""
+    rng, (w, h) = np.random.default_rng(12), size
+    frame = random_frame(replace(YUV420, chroma_shift=shift, chroma_offset_px=(0.0, 0.0)), size)
+    for _ in range(30):
+        (x0, x1), (y0, y1) = np.sort(rng.choice(w + 1, 2, False)), np.sort(rng.choice(h + 1, 2, False))
+        over = rng.uniform(0, 1, (y1 - y0, x1 - x0, 4)).astype(np.float32)
+        everywhere = np.zeros((h, w, 4), np.float32)
+        everywhere[y0:y1, x0:x1] = over
+        part = frame.composed(layer=Layer(Region(x0, y0, x1, y1), over))
+        assert same_codes(part, frame.composed(layer=Layer(frame.full_region, everywhere)))
+
+
 @pytest.mark.parametrize("name", FORMATS)
 def test_codes_away_from_the_region_stay(name):
     frame, region = random_frame(FORMATS[name]), Region(9, 7, 20, 18)
