@@ -40,6 +40,9 @@ _ALONE = 64
 _LEAST_ORDER = 1
 """Order up to which blocks are measured at least, where the sheet has it: lamps in the few blocks without stripes leave
 nothing that tells L_0."""
+_LOWER_EVERY = 2
+"""How many times more rarely light is measured where a lower order than the sheet's was found to suffice: half of the
+frames tell the filter as well what it averages."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -178,9 +181,10 @@ class LightingTracker:
         if pose.camera_from_probe is None:
             return False
         self._since_estimate += 1
-        if self._last is not None and self._since_estimate < (
-            self.effort.estimate_every or self.settings.estimate_every
-        ):
+        every = self.effort.estimate_every or self.settings.estimate_every
+        if self.settings.filtered and self._choice is not None and self._choice.order < self._highest:
+            every *= _LOWER_EVERY
+        if self._last is not None and self._since_estimate < every:
             return False
         self._since_estimate = 0
         return True

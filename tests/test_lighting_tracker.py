@@ -280,14 +280,20 @@ def test_the_order_follows_what_is_shown_and_what_an_effort_allows(film):
     order = np.repeat(frequency_order(PROBE.frequencies), 2)[1:]
     tracker = LightingTracker(PROBE, CAMERA)
     tracker.require(Need(np.eye(count), np.diag(np.where(order < 2, 1.0, 1e-9)), 0.04))
-    frames = [synthetic.frame for synthetic in film()] * 6
-    orders = []
+    frames = [synthetic.frame for synthetic in film()] * 8
+    orders, measured = [], []
     for index, frame in enumerate(frames):
-        orders.append(tracker.update(replace(frame, index=index, time_s=0.04 * index)).lighting.order)
+        estimate = tracker.update(replace(frame, index=index, time_s=0.04 * index))
+        orders.append(estimate.lighting.order)
+        measured.append(estimate.raw is not None)
     assert orders[0] == 2
     assert orders[-1] == 1
+    assert all(measured[: orders.index(1)])
+    assert sum(measured[-4:]) == 2
     tracker.effort = Effort(order=0)
-    estimate = tracker.update(replace(frames[0], time_s=0.04 * len(frames)))
+    # where a lower order does, every second frame is measured
+    for index in range(len(frames), len(frames) + 2):
+        estimate = tracker.update(replace(frames[0], index=index, time_s=0.04 * index))
     assert estimate.lighting.order == 0
     assert estimate.effort == Effort(order=0)
 
