@@ -16,11 +16,11 @@ typedef struct {
     int fewest, most;       /* Gauss-Newton steps; the first is without weights */
     double tolerance_px;    /* the level ends with a step that moves the sheet by less */
     double floors[2];       /* correlation that a marker needs to take part, in the first step and after */
-    int share;              /* one of so many points is used */
+    int shares[2];          /* of so many points one is used, in the first step and after */
 } Level;
 
-static const Level FINEST = {2, 8, 0.02, {0.5, OCCLUDED_BELOW}, 1};
-static const Level COARSER = {1, 6, 0.2, {-1.0, 0.2}, 2};
+static const Level FINEST = {2, 8, 0.02, {0.5, OCCLUDED_BELOW}, {2, 1}};
+static const Level COARSER = {1, 6, 0.2, {-1.0, 0.2}, {2, 2}};
 
 static int differs(double wanted, double drawn)
 {
@@ -109,7 +109,7 @@ static int fit(Alignment *a, double blur_px, int shrink, Equations *equations)
     memset(a->coefficients, 0, sizeof(double) * (size_t)(a->markers * LIGHTING));
     for (int k = 1; k <= level.most; k++) {
         double scale[POSE], factor[POSE][POSE], step[POSE];
-        *equations = linearise(a, (int)a->points / level.share, planes, level.floors[k > 1], blur_px);
+        *equations = linearise(a, (int)a->points / level.shares[k > 1], planes, level.floors[k > 1], blur_px);
         if (equations->used == 0 || !factorise(equations, 1e-9, scale, factor))
             return 0;
         for (int i = 0; i < POSE; i++)
