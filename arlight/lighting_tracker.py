@@ -149,8 +149,10 @@ class LightingTracker:
             return self._update(frame)
 
     def _one_thread(self) -> AbstractContextManager[object]:
-        """Products this small run slower on several threads than on one."""
-        return nullcontext() if self._blas is None else self._blas.limit(limits=1)
+        """Products this small run slower on several threads than on one; asking costs less than setting."""
+        if self._blas is None or all(blas.num_threads == 1 for blas in self._blas.lib_controllers):
+            return nullcontext()
+        return self._blas.limit(limits=1)
 
     def _update(self, frame: Frame) -> FrameEstimate:
         start = self._clock()

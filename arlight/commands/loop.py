@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from threadpoolctl import threadpool_limits
 
 from arlight.commands.interruption import Interruption
 from arlight.results.frame_loop import FrameLoop, FrameStages, Sinks
@@ -47,6 +48,7 @@ def run_frames(
         Interruption() as interruption,
         FrameProgress(work) as progress,
         settled_memory(),
+        threadpool_limits(limits=1, user_api="blas"),
         FrameLoop(frames, pipeline, sinks, work.source, work.deadline) as records,
     ):
         for record in records:
