@@ -12,8 +12,8 @@ class Effort:
     samples_per_block: int | None = None
     """Pixels a block is sampled with at most."""
     estimate_every: int | None = None
-    """The light is measured in every n-th frame that shows the sheet, and predicted in those between."""
+    """The light is measured in every n-th frame that shows the sheet at most, and predicted in those between."""
     supersampling: int | None = None
-    """Samples along a pixel's side when drawing."""
+    """Samples along a pixel's side when drawing, at most."""
     shadow: bool = True
     """Whether the object casts one."""

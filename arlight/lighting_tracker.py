@@ -183,7 +183,7 @@ class LightingTracker:
         if pose.camera_from_probe is None:
             return False
         self._since_estimate += 1
-        every = self.effort.estimate_every or self.settings.estimate_every
+        every = max(self.effort.estimate_every or 1, self.settings.estimate_every)
         if self.settings.filtered and self._choice is not None and self._choice.order < self._highest:
             every *= _LOWER_EVERY
         if self._last is not None and self._since_estimate < every:

@@ -37,10 +37,7 @@ class Preset:
 
 
 PRESETS: dict[PresetName, Preset] = {
-    "fast": Preset(
-        TrackerSettings(estimate_every=4),
-        RelightSettings(shadow_texels=64, supersampling=1),
-    ),
+    "fast": Preset(TrackerSettings(estimate_every=8)),
     "balanced": Preset(TrackerSettings(estimate_every=2)),
     "accurate": Preset(
         TrackerSettings(samples_per_block=600, order="all"),

@@ -202,7 +202,7 @@ class Relighter:
         drawer: ObjectDrawer | None = self._native or self._opened
         if drawer is None:
             drawer = self._opened = self._open()
-        drawer.supersampling = supersampling or self.settings.supersampling
+        drawer.supersampling = min(supersampling or self.settings.supersampling, self.settings.supersampling)
         if self._native is None and len(packed) < len(self._reconstruction.independent):
             packed = self._reconstruction.completed(packed).astype(np.float32)
         return drawer.draw(view, packed)
