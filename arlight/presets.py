@@ -50,12 +50,12 @@ PRESETS: dict[PresetName, Preset] = {
 _SPARING = Effort(supersampling=1, estimate_every=16)
 LADDER: tuple[Rung, ...] = (
     Rung(Effort(), 1.0, 1.0),
-    Rung(Effort(estimate_every=4), 0.64, 0.95),
-    Rung(Effort(supersampling=1, estimate_every=4), 0.62, 0.85),
-    Rung(Effort(supersampling=1, estimate_every=8), 0.46, 0.82),
-    Rung(_SPARING, 0.36, 0.8),
-    Rung(replace(_SPARING, shadow=False), 0.36, 0.54),
-    Rung(replace(_SPARING, order=3, shadow=False), 0.3, 0.54),
+    Rung(Effort(estimate_every=4), 0.73, 1.0),
+    Rung(Effort(supersampling=1, estimate_every=4), 0.7, 0.9),
+    Rung(Effort(supersampling=1, estimate_every=8), 0.54, 0.9),
+    Rung(_SPARING, 0.44, 0.9),
+    Rung(replace(_SPARING, shadow=False), 0.44, 0.65),
+    Rung(replace(_SPARING, order=3, shadow=False), 0.36, 0.65),
 )
 """What a deadline gives up, step by step, from the settings as they are. Costs, and errors that rise from rung to rung,
 were measured on the workloads of the front."""
