@@ -18,11 +18,13 @@ _LOOK_EVERY_S = 2.0
 _JUDGE_EVERY_S = 0.8
 """Time between two frames in which the order is thought over, half of it where a lower one may do, and less while
 little has been seen [s]."""
+_LOWEST = 1
+"""Lowest order that is chosen, where the sheet has it: a level alone does not tell one light from another."""
 _WATCH_EVERY_S = 0.15
-"""Time between two frames in which light of a lower order is compared with what it was [s]."""
+"""Time between two frames in which light is compared with what it was [s]."""
 _STANDS_OUT = 4.0
 """Standard deviations by which a frame must show more than usual, or squared errors by which the light must change, for
-all orders to be followed again; twice as many after every time that it was in vain."""
+all orders to be followed again; twice as many after every time that it was in vain, until the light changes."""
 _LOWER_AFTER_S = 0.8
 """Time for which a lower order must have sufficed before it is taken [s]."""
 _KEPT = 0.95
@@ -43,6 +45,7 @@ class OrderChoice:
         self._light = ShownLight(frequencies, need)
         self._drawn = DrawnLight(len(need.independent))
         self.highest, self._tolerance = self._light.highest, need.tolerance
+        self._lowest = min(_LOWEST, self.highest)
         self.reset()
 
     def reset(self) -> None:
@@ -55,11 +58,11 @@ class OrderChoice:
         self._learnt_s = self._began_s = -math.inf
         self._left_out = 0.0
         self._doubt = _STANDS_OUT
-        self._rose = False
+        self._rose = self._suspected = False
         self._usual = np.zeros(self.highest + 1)
         self._looked_s = self._judged_s = self._watched_s = -math.inf
         self._fits_since_s = math.inf
-        self._strength, self._unsure = 0.0, 0.0
+        self._strength, self._unsure = 0.0, math.inf
 
     def order_to_measure(self, time_s: float) -> int:
         """Highest order to measure in the frame at a time [s]: the chosen one, now and then all."""
@@ -76,13 +79,12 @@ class OrderChoice:
             self._look(seen)
         if self._leaving or filtered.order != self.order:
             return
-        if self.order < self.highest and not 0.0 <= time_s - self._watched_s < _WATCH_EVERY_S:
+        if self._suspected or self._is_to_judge(time_s) or not 0.0 <= time_s - self._watched_s < _WATCH_EVERY_S:
             self._watched_s = time_s
             self._watch(filtered)
-            if filtered.order < self.order:
-                return
-        soon = 0.5 if math.isfinite(self._fits_since_s) else 1.0
-        if not 0.0 <= time_s - self._judged_s < min(soon * _JUDGE_EVERY_S, time_s - self._began_s):
+        if self._suspected or filtered.order < self.order:
+            return
+        if self._is_to_judge(time_s):
             self._began_s = time_s if math.isinf(self._began_s) else self._began_s
             self._judged_s = time_s
             self._judge(seen, filtered, time_s)
@@ -100,21 +102,31 @@ class OrderChoice:
         if self._leaving and self._drawn.settled:
             self.order, self._leaving = self._core, False
 
-    def _watch(self, filtered: Lighting) -> None:
-        """Follow all orders again if the light is no longer that for which some were left out.
+    def _is_to_judge(self, time_s: float) -> bool:
+        """Whether the order is to be thought over in a frame at a time [s]."""
+        soon = 0.5 if math.isfinite(self._fits_since_s) else 1.0
+        return not 0.0 <= time_s - self._judged_s < min(soon * _JUDGE_EVERY_S, time_s - self._began_s)
 
-        One frame would hardly tell: what a second of them averages may be far below the noise of each.
+    def _watch(self, filtered: Lighting) -> None:
+        """Begin anew with all orders if the light is no longer the one that was judged.
+
+        One frame would hardly tell, for what a second of them averages may be far below the noise of each; nor may the
+        filter's first one of another light be trusted, so that the next has to say the same.
         """
-        strength = self._light.strength(filtered)
+        strength = self._light.strength(filtered, self._core)
         change, larger = abs(strength - self._strength), max(strength, self._strength)
-        if change > _STEP * larger and change > self._doubt * self._unsure:
+        changed = change > _STEP * larger and change > self._doubt * self._unsure
+        if changed and self._suspected:
             self._rise()
+            # what was learnt of noise was another light's
+            self._usual[:], self._doubt, self._rose = 0.0, _STANDS_OUT, False
+        self._suspected = changed and not self._suspected
 
     def _rise(self) -> None:
         """Follow all orders, to be seen little by little."""
         self.order, self._left_out, self._fits_since_s, self._rose = self.highest, 0.0, math.inf, True
         # what the filter makes of them is not known yet
-        self._leaving, self._began_s, self._judged_s = False, -math.inf, -math.inf
+        self._leaving, self._began_s, self._judged_s, self._unsure = False, -math.inf, -math.inf, math.inf
 
     def _look(self, seen: Lighting) -> None:
         """Follow all orders again if one frame shows more of them than any did before they were left out.
@@ -134,6 +146,7 @@ class OrderChoice:
         squared_error = self._light.squared_errors(filtered)
         most = (1.0 + self._tolerance) ** 2 * squared_error.min() - self._left_out
         lowest = int(np.argmax(squared_error <= most)) if most >= squared_error.min() else self.order
+        lowest = max(lowest, self._lowest)
         if lowest >= self.order:
             self._fits_since_s = math.inf
             if self.order == self.highest:
@@ -143,7 +156,9 @@ class OrderChoice:
         elif time_s - self._fits_since_s >= _LOWER_AFTER_S:
             self._left_out += float(squared_error[lowest] - squared_error.min())
             self._doubt *= 2.0 if self._rose else 1.0
-            self._strength, self._unsure = self._light.strength(filtered.truncated(lowest)), float(squared_error.min())
-            self._fits_since_s, self._rose = math.inf, False
-            self._core, self._leaving = lowest, True
+            self._fits_since_s, self._rose, self._leaving = math.inf, False, True
+        if self._leaving or self.order == self.highest:
+            # what suffices is known best
+            self._core, self._unsure = lowest, float(squared_error.min())
+            self._strength = self._light.strength(filtered, lowest)
         self._drawn.pass_to(self._light.weights(filtered, self._core if self._leaving else self.order))

@@ -107,10 +107,11 @@ class ShownLight:
         # of a quadratic form of normal errors
         return math.sqrt(2.0 * float(np.sum(errors * errors.T)))
 
-    def strength(self, lighting: Lighting) -> float:
-        """Mean square of what is shown with the parts above order 0, one by one."""
-        parts = self._parts_of(lighting)[1:]
-        return float(np.mean(parts**2, axis=1) @ np.diag(self._shown)[1 : 1 + len(parts)])
+    def strength(self, lighting: Lighting, order: int) -> float:
+        """Mean square of what is shown with the parts above order 0 and up to an order, one by one."""
+        end = self._ends[order]
+        parts = self._parts_of(lighting)[1:end]
+        return float(np.mean(parts**2, axis=1) @ np.diag(self._shown)[1:end])
 
     def weights(self, filtered: Lighting, order: int) -> Array:
         """(m, m) that make the likeliest real-packed coefficients of measured ones, up to an order and beyond by it."""

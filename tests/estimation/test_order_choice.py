@@ -17,6 +17,8 @@ RICH = [1.0, 0.3, 0.3, 0.3, 0.3]
 """Amplitudes by order of light like a window's."""
 SOFT = [1.0, 0.03, 0.03, 0.03, 0.03]
 """Light like that of an overcast sky."""
+EVEN = [1.0, 1e-4, 1e-4, 1e-4, 1e-4]
+"""Light of which nothing but the level can be measured."""
 
 
 def lighting(amplitude: list[float], stddev: float, seed: int = 0, order: int = 4) -> Lighting:
@@ -122,6 +124,44 @@ def test_a_switch_of_the_low_orders_is_reason_to_look_at_all_at_once() -> None:
     changed = settled(choice, RICH, 0.02, 7, 2.41)
     assert 4 in changed[1:6]
     assert choice.order == 4
+
+
+def test_light_that_had_nothing_above_its_level_is_followed_when_it_has() -> None:
+    """Without waiting for the next look at all orders: half a second is twelve frames and a half."""
+    choice = OrderChoice(FREQUENCIES, need([1.0] * 5))
+    measured = settled(choice, EVEN, 0.02, 60)
+    looked = len(measured) - 1 - measured[::-1].index(4)
+    settled(choice, EVEN, 0.02, 5, 60 / 25.0)
+    low = choice.order
+    changed = settled(choice, RICH, 0.02, 12, 65 / 25.0)
+    assert low < 4
+    assert looked + 50 > 65 + 12
+    assert choice.order == 4
+    assert changed[-1] == 4
+
+
+@pytest.mark.parametrize("frames", [8, 12, 16, 20])
+def test_light_that_changes_while_all_orders_are_followed_is_drawn_within_three_quarters_of_a_second(
+    frames: int,
+) -> None:
+    choice = OrderChoice(FREQUENCIES, need([1.0] * 5))
+    settled(choice, EVEN, 0.02, frames)
+    assert choice.order == 4
+    settled(choice, RICH, 0.02, 18, frames / 25.0)
+    light = lighting(RICH, 0.0004)
+    low = ORDERS <= 2
+    np.testing.assert_allclose(choice.shown(light).coefficients[low], light.coefficients[low], rtol=0.05)
+
+
+def test_one_frame_that_is_far_off_is_no_other_light() -> None:
+    choice = OrderChoice(FREQUENCIES, need([1.0] * 5))
+    settled(choice, SOFT, 0.02, 60)
+    order = choice.order
+    assert order < 4
+    for frame in range(20):
+        off = RICH if frame % 4 == 0 else SOFT
+        choice.learn(lighting(off, 0.02, frame, order), lighting(off, 0.004, frame, order), (60 + frame) / 25.0)
+        assert choice.order == order
 
 
 def test_looking_in_vain_gets_rarer() -> None:

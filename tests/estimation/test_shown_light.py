@@ -51,7 +51,7 @@ def test_uncertainty_makes_every_order_worse(shown: ShownLight) -> None:
 
 def test_a_brighter_light_is_no_other_one(shown: ShownLight) -> None:
     faint, bright = lighting(0.02), lighting(0.02, scale=7.0)
-    assert shown.strength(bright) == pytest.approx(shown.strength(faint), rel=1e-4)
+    assert shown.strength(bright, bright.order) == pytest.approx(shown.strength(faint, faint.order), rel=1e-4)
     shown.take_in(faint)
     first = shown.squared_errors(faint)
     shown.reset()
