@@ -40,9 +40,9 @@ _ALONE = 64
 _LEAST_ORDER = 1
 """Order up to which blocks are measured at least, where the sheet has it: lamps in the few blocks without stripes leave
 nothing that tells L_0."""
-_LOWER_EVERY = 2
-"""How many times more rarely light is measured where a lower order than the sheet's was found to suffice: half of the
-frames tell the filter as well what it averages."""
+_LOWER_EVERY, _RAREST = 3, 4
+"""How many times more rarely light is measured where a lower order than the sheet's was found to suffice, for a third
+of the frames tells the filter as well what it averages; up to every which frame, for a change is to be seen soon."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -185,7 +185,7 @@ class LightingTracker:
         self._since_estimate += 1
         every = max(self.effort.estimate_every or 1, self.settings.estimate_every)
         if self.settings.filtered and self._choice is not None and self._choice.order < self._highest:
-            every *= _LOWER_EVERY
+            every = max(every, min(_LOWER_EVERY * every, _RAREST))
         if self._last is not None and self._since_estimate < every:
             return False
         self._since_estimate = 0
