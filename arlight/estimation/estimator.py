@@ -70,7 +70,8 @@ class Estimate:
         Args:
             measured: (blocks,) which blocks were measured, all by default; the others keep their stripes.
         """
-        guide = stripes + _HALFWAY * (self.stripes - stripes)
+        guide = self.stripes + stripes
+        guide *= _HALFWAY
         if measured is not None:
             guide = np.where(measured[:, None, None], guide, stripes)
         return replace(self, stripes=guide)
