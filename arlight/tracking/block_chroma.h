@@ -15,7 +15,7 @@
 #define PRIOR_VARIANCE_PX2 1.0
 #define PRIOR_SHIFT_PX 0.3          /* how far encoders' chroma is from where their tags put it */
 #define STRONGEST_CYCLES 0.2        /* stripes finer than this say nothing about it either [1/px] */
-#define FEW_CELLS 16                /* beside an eighth of the pixels' number: more cells say hardly more */
+#define FEW_CELLS 16                /* beside a quarter of the pixels' number: more cells say nothing more */
 #define LEAST_KEPT 0.3              /* what averaging a cell's pixels must leave of stripes for them to be compared */
 
 /* One block's chroma, complex numbers as cosine and minus sine part. */
@@ -49,7 +49,7 @@ static HOT float sum_list(int total, const float *restrict values, float *least)
 /* Sums over the cells of one block: values Cb, Cr and the mean of their luma, as far as chroma is scaled with it. */
 static HOT void sum_cells(const Blocks *b, int block, const Grid *grid, int limited, Sums *sums, Chroma *chroma)
 {
-    int eighth = (int)b->limit / 8, limit = eighth + (eighth < FEW_CELLS ? eighth : FEW_CELLS);
+    int quarter = (int)b->limit / 4, limit = quarter + (quarter < FEW_CELLS ? quarter : FEW_CELLS);
     int total = list_cells(b, block, 0, grid, limit, CELLS);
     float *c = list_of(b, 0, PHASE_LIST), *s = list_of(b, 0, SINE_LIST), *values = b->lists;
     float *luma = list_of(b, 0, LIGHT_LIST);
