@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 ITERATIONS = 2
 """How often a frame's weights and solution are refined after the first frame: with less, a lamp that comes into a block
 spoils the frame; more changes nothing."""
-_HALFWAY = 0.5
-"""Of the last stripes and the new ones, what guides the next frame; overshoots of up to three times die away."""
 _native = library(__file__, "sheet_estimate")
 _native.estimate_sheet.argtypes = (*((ctypes.c_void_p,) * 4), ctypes.c_int64, *((ctypes.c_void_p,) * 6))
 
@@ -65,13 +63,14 @@ class Estimate:
         """The same, with stripes that go on from those (blocks, 7, 3) of the last estimate.
 
         Stripes guide how the next frame's chroma is read, and may be overshot there: what is too red is found too
-        green next, of fine stripes beside a lamp by more than it was. Half of each step lets that die away.
+        green next, of fine stripes beside a lamp by more than it was. Half of each step lets overshoots of up to three
+        times die away.
 
         Args:
             measured: (blocks,) which blocks were measured, all by default; the others keep their stripes.
         """
         guide = self.stripes + stripes
-        guide *= _HALFWAY
+        guide *= 0.5
         if measured is not None:
             guide = np.where(measured[:, None, None], guide, stripes)
         return replace(self, stripes=guide)
