@@ -17,6 +17,7 @@ from arlight.errors import ProbeError
 from arlight.estimation.estimator import Estimate, LightingEstimator
 from arlight.estimation.filter import LightingFilter
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.natural_light import NaturalLight
 from arlight.estimation.nuisance import Nuisance
 from arlight.estimation.order_choice import OrderChoice
 from arlight.estimation.shown_light import Need
@@ -40,9 +41,9 @@ _ALONE = 64
 _LEAST_ORDER = 1
 """Order up to which blocks are measured at least, where the sheet has it: lamps in the few blocks without stripes leave
 nothing that tells L_0."""
-_LOWER_EVERY, _RAREST = 3, 4
-"""How many times more rarely light is measured where a lower order than the sheet's was found to suffice, for a third
-of the frames tells the filter as well what it averages; up to every which frame, for a change is to be seen soon."""
+_LOWER_EVERY = 4
+"""Light is measured in every so-manieth frame at most where a lower order than the sheet's was found to suffice: that
+tells the filter as well what it averages, and a change is still seen soon."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
@@ -118,7 +119,7 @@ class LightingTracker:
         )
         self._filter = LightingFilter()
         self._exposure = _exposure_meter(probe, camera)
-        self._frequencies, self._highest = probe.frequencies, probe.order
+        self._probe, self._highest = probe, probe.order
         self._block_order = _block_orders(probe)
         self._blas = ThreadpoolController().select(user_api="blas") if 2 * len(probe.frequencies) > _ALONE else None
         self._choice: OrderChoice | None = None
@@ -127,7 +128,7 @@ class LightingTracker:
     def require(self, need: Need) -> None:
         """Say what the light is wanted for, which the order `auto` goes by; until then all orders are measured."""
         if self.settings.order == "auto":
-            self._choice = OrderChoice(self._frequencies, need)
+            self._choice = OrderChoice(NaturalLight(self._probe.slab, self._probe.frequencies), need)
 
     def reset(self) -> None:
         """Forget everything about earlier frames."""
@@ -185,7 +186,7 @@ class LightingTracker:
         self._since_estimate += 1
         every = max(self.effort.estimate_every or 1, self.settings.estimate_every)
         if self.settings.filtered and self._choice is not None and self._choice.order < self._highest:
-            every = max(every, min(_LOWER_EVERY * every, _RAREST))
+            every = max(every, _LOWER_EVERY)
         if self._last is not None and self._since_estimate < every:
             return False
         self._since_estimate = 0

@@ -289,10 +289,10 @@ def test_the_order_follows_what_is_shown_and_what_an_effort_allows(film):
     assert orders[0] == 2
     assert orders[-1] == 1
     assert all(measured[: orders.index(1)])
-    assert sum(measured[-6:]) == 2
+    assert sum(measured[-8:]) == 2
     tracker.effort = Effort(order=0)
-    # where a lower order does, every third frame is measured
-    for index in range(len(frames), len(frames) + 3):
+    # where a lower order does, every fourth frame is measured
+    for index in range(len(frames), len(frames) + 4):
         estimate = tracker.update(replace(frames[0], index=index, time_s=0.04 * index))
     assert estimate.lighting.order == 0
     assert estimate.effort == Effort(order=0)

@@ -7,10 +7,10 @@ Measuring less saves work, so the lowest order is chosen that costs next to noth
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from arlight.estimation.drawn_light import DrawnLight
 from arlight.estimation.lighting import Lighting
+from arlight.estimation.natural_light import PriorKnowledge
 from arlight.estimation.shown_light import Need, ShownLight
 
 _LOOK_EVERY_S = 2.0
@@ -20,8 +20,6 @@ _JUDGE_EVERY_S = 0.8
 little has been seen [s]."""
 _LOWEST = 1
 """Lowest order that is chosen, where the sheet has it: a level alone does not tell one light from another."""
-_WATCH_EVERY_S = 0.15
-"""Time between two frames in which light is compared with what it was [s]."""
 _STANDS_OUT = 4.0
 """Standard deviations by which a frame must show more than usual, or squared errors by which the light must change, for
 all orders to be followed again; twice as many after every time that it was in vain, until the light changes."""
@@ -37,12 +35,12 @@ class OrderChoice:
     """Chooses the order to measure and draw in every frame.
 
     Args:
-        frequencies: (k, 2) that the sheet measures, by rising order.
+        prior: what is known of light before the sheet measures it.
         need: what of the light is wanted.
     """
 
-    def __init__(self, frequencies: NDArray[np.int64], need: Need) -> None:
-        self._light = ShownLight(frequencies, need)
+    def __init__(self, prior: PriorKnowledge, need: Need) -> None:
+        self._light = ShownLight(prior, need)
         self._drawn = DrawnLight(len(need.independent))
         self.highest, self._tolerance = self._light.highest, need.tolerance
         self._lowest = min(_LOWEST, self.highest)
@@ -60,7 +58,7 @@ class OrderChoice:
         self._doubt = _STANDS_OUT
         self._rose = self._suspected = False
         self._usual = np.zeros(self.highest + 1)
-        self._looked_s = self._judged_s = self._watched_s = -math.inf
+        self._looked_s = self._judged_s = -math.inf
         self._fits_since_s = math.inf
         self._strength, self._unsure = 0.0, math.inf
 
@@ -79,9 +77,7 @@ class OrderChoice:
             self._look(seen)
         if self._leaving or filtered.order != self.order:
             return
-        if self._suspected or self._is_to_judge(time_s) or not 0.0 <= time_s - self._watched_s < _WATCH_EVERY_S:
-            self._watched_s = time_s
-            self._watch(filtered)
+        self._watch(filtered)
         if self._suspected or filtered.order < self.order:
             return
         if self._is_to_judge(time_s):
@@ -108,7 +104,7 @@ class OrderChoice:
         return not 0.0 <= time_s - self._judged_s < min(soon * _JUDGE_EVERY_S, time_s - self._began_s)
 
     def _watch(self, filtered: Lighting) -> None:
-        """Begin anew with all orders if the light is no longer the one that was judged.
+        """Begin anew with all orders, at once, if the light is no longer the one that was judged.
 
         One frame would hardly tell, for what a second of them averages may be far below the noise of each; nor may the
         filter's first one of another light be trusted, so that the next has to say the same.
@@ -117,9 +113,8 @@ class OrderChoice:
         change, larger = abs(strength - self._strength), max(strength, self._strength)
         changed = change > _STEP * larger and change > self._doubt * self._unsure
         if changed and self._suspected:
-            self._rise()
-            # what was learnt of noise was another light's
-            self._usual[:], self._doubt, self._rose = 0.0, _STANDS_OUT, False
+            self.reset()
+            return
         self._suspected = changed and not self._suspected
 
     def _rise(self) -> None:
@@ -144,8 +139,9 @@ class OrderChoice:
             self._usual = np.maximum(_KEPT * self._usual, self._light.beyond(seen))
         self._light.take_in(filtered)
         squared_error = self._light.squared_errors(filtered)
-        most = (1.0 + self._tolerance) ** 2 * squared_error.min() - self._left_out
-        lowest = int(np.argmax(squared_error <= most)) if most >= squared_error.min() else self.order
+        least = float(squared_error.min())
+        most = max((1.0 + self._tolerance) ** 2 * least, least + self._light.unseen) - self._left_out
+        lowest = int(np.argmax(squared_error <= most)) if most >= least else self.order
         lowest = max(lowest, self._lowest)
         if lowest >= self.order:
             self._fits_since_s = math.inf
@@ -159,6 +155,6 @@ class OrderChoice:
             self._fits_since_s, self._rose, self._leaving = math.inf, False, True
         if self._leaving or self.order == self.highest:
             # what suffices is known best
-            self._core, self._unsure = lowest, float(squared_error.min())
+            self._core, self._unsure = lowest, max(least, self._light.unseen)
             self._strength = self._light.strength(filtered, lowest)
         self._drawn.pass_to(self._light.weights(filtered, self._core if self._leaving else self.order))

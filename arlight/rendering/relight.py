@@ -184,8 +184,7 @@ class Relighter:
     @cached_property
     def need(self) -> Need:
         """What of the light the object shows, from which the order that it requires follows."""
-        independent = self._reconstruction.independent
-        return Need(independent, independent.T @ self.appearance.gram @ independent, _TOLERANCE)
+        return Need(self._reconstruction.independent, self.appearance.gram, _TOLERANCE)
 
     def release(self) -> None:
         """Give back what drawing holds, from the thread that renders; it is made again when needed."""

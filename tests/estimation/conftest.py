@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from arlight.estimation.channel_fit import GREEN, SheetFit
+from arlight.estimation.likely_light import LikelyLight
 from arlight.estimation.measured_blocks import MeasuredBlocks
 from arlight.estimation.nuisance import Nuisance
 from arlight.estimation.response import BlockResponse, optical_transfer
@@ -186,3 +187,20 @@ class Fitted:
 @pytest.fixture(scope="session")
 def fitted(probe, response, plane):
     return Fitted(probe, response, plane)
+
+
+class Anywhere:
+    """Light that may come from anywhere, whatever a guess says.
+
+    Args:
+        frequencies: (k, 2) of the coefficients.
+        independent: (m, m) lower triangle that makes coefficients of independent parts; by default each is one.
+    """
+
+    def __init__(self, frequencies, independent=None):
+        self.frequencies = frequencies
+        triangle = np.eye(2 * len(frequencies) - 1) if independent is None else independent
+        self.anywhere = LikelyLight.of_covariance(triangle @ triangle.T)
+
+    def as_bright_as(self, _guess):
+        return self.anywhere

@@ -9,6 +9,7 @@ from arlight.estimation.drawn_light import DrawnLight
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.shown_light import Need, ShownLight
 from arlight.fourier import frequency_order, half_plane_frequencies, pack_real, unpack_real
+from tests.estimation.conftest import Anywhere
 
 FREQUENCIES = half_plane_frequencies(3)
 PACKED_ORDERS = np.repeat(frequency_order(FREQUENCIES), 2)[1:]
@@ -26,7 +27,7 @@ def need() -> Need:
 
 @pytest.fixture
 def shown(need: Need) -> ShownLight:
-    return ShownLight(FREQUENCIES, need)
+    return ShownLight(Anywhere(FREQUENCIES, need.independent), need)
 
 
 def lighting(stddev: float, scale: float = 1.0, seed: int = 2) -> Lighting:

@@ -115,17 +115,11 @@ def need_error(need: Need, lighting: Lighting, truth: FrameTruth) -> float:
     Returns:
         rms of the difference of linear light, relative to the rms of the true picture.
     """
-    true, shown = (_parts(need, each) for each in (truth.coefficients, lighting.coefficients))
-    difference = -true
-    difference[: len(shown)] += shown
-    error, power = (float(np.sum(parts * (need.shown @ parts))) for parts in (difference, true))
+    true, shown = pack_real(truth.coefficients), pack_real(lighting.coefficients)
+    n = len(shown)
+    drawn = need.independent[:, :n] @ np.linalg.solve(need.independent[:n, :n], shown)
+    error, power = (float(np.sum(each * (need.shown @ each))) for each in (drawn - true, true))
     return float(np.sqrt(error / power)) if power > 0.0 else float("nan")
-
-
-def _parts(need: Need, coefficients: NDArray[np.complex128]) -> Array:
-    """(m, 3) independent parts of the light; the first of these follow from the first coefficients."""
-    packed = pack_real(coefficients)
-    return np.asarray(np.linalg.solve(need.independent[: len(packed), : len(packed)], packed))
 
 
 def relative_rms(shown: NDArray[np.float32], reference: NDArray[np.float32]) -> float:

@@ -26,7 +26,7 @@ OBJECTS = {
 """Looks of the default object."""
 LEAST_FRAMES = 24
 """Frames over which costs are averaged: a look at all orders, once a second, counts in every one of them."""
-_SETTLING = 40
+_SETTLING = 72
 """Frames until a lower order has been taken where one suffices."""
 
 
