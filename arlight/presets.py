@@ -40,7 +40,7 @@ PRESETS: dict[PresetName, Preset] = {
     "fast": Preset(TrackerSettings(estimate_every=8)),
     "balanced": Preset(TrackerSettings(estimate_every=2)),
     "accurate": Preset(
-        TrackerSettings(samples_per_block=600, order="all"),
+        TrackerSettings(estimate_every=2),
         RelightSettings(directions=1024, shadow_texels=192, supersampling=3, mesh_faces=64_000),
         EncodingSettings("veryfast", 16),
     ),

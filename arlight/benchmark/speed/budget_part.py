@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from arlight.benchmark.speed.clip_errors import true_lighting
 from arlight.benchmark.speed.findings import Findings
-from arlight.benchmark.speed.front import picture_error
+from arlight.benchmark.speed.picture_errors import picture_error, reference_picture
 from arlight.benchmark.speed.playback import FilmedClip
 from arlight.budget import BudgetController
 from arlight.lighting_tracker import FrameEstimate
@@ -114,6 +113,6 @@ def _median_error(clip: FilmedClip, kept: Sequence[tuple[Frame, FrameResult]], f
         if result.pose.status == "left out" or result.lighting is None:
             continue
         truth = clip.truth[frame.index % len(clip.truth)]
-        reference = finest.render(frame, truth.pose, true_lighting(result.lighting, truth, clip.probe))
+        reference = reference_picture(finest, frame, truth, result.lighting, clip.probe)
         errors.append(picture_error(frame, result.composite, reference))
     return float(np.nanmedian(errors)) if errors else float("inf")

@@ -6,10 +6,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.benchmark.speed.clip_errors import coefficient_errors, relative_rms, rms, true_lighting
+from arlight.benchmark.speed.clip_errors import coefficient_errors, rms
 from arlight.benchmark.speed.contest import Contender, contend, contender
 from arlight.benchmark.speed.findings import Findings, Ratio
 from arlight.benchmark.speed.front_settings import FrontSetting
+from arlight.benchmark.speed.picture_errors import picture_error, reference_picture
 from arlight.benchmark.speed.playback import TURN, FilmedClip
 from arlight.benchmark.speed.relighters import FINEST, Relighters
 from arlight.benchmark.speed.spread import Spread, block_means, paired_ratio, spread
@@ -17,14 +18,12 @@ from arlight.benchmark.speed.yardsticks import ArucoPose
 from arlight.estimation.lighting import Lighting
 from arlight.lighting_tracker import FrameEstimate
 from arlight.synthetic.truth import FrameTruth
-from arlight.video.frame import Frame, Region
+from arlight.video.frame import Frame
 
 _JUDGED_EVERY = 5
 """Frames; no divisor of a cycle, so that each of its parts is judged."""
 _BLOCK = 8
 """Frames over which costs are averaged before their median is taken: the light may be measured in every eighth only."""
-_CHANGED = 1e-6
-"""Linear light by which a pixel differs from the recorded one at least where something was drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,32 +174,8 @@ class _PictureJudge:
         if frame.index not in self._references:
             # those of the turn before are not asked for again
             self._references = {i: of for i, of in self._references.items() if abs(i - frame.index) < TURN}
-            true = true_lighting(lighting, truth, self._clip.probe)
-            self._references[frame.index] = self._finest.render(frame, truth.pose, true)
+            self._references[frame.index] = reference_picture(self._finest, frame, truth, lighting, self._clip.probe)
         return self._references[frame.index]
-
-
-def picture_error(frame: Frame, composite: Frame, reference: Frame) -> float:
-    """Error of a composite where it or the reference differs from the recorded frame: object, shadow and their edges.
-
-    Returns:
-        rms of the difference in linear light, relative to the rms of the reference there; nan where nothing is drawn.
-    """
-    region = _changed_region(frame, composite, reference)
-    if region is None:
-        return float("nan")
-    recorded, shown, true = (each.linear_rgb(region) for each in (frame, composite, reference))
-    drawn = np.any((np.abs(shown - recorded) > _CHANGED) | (np.abs(true - recorded) > _CHANGED), axis=2)
-    return relative_rms(shown[drawn], true[drawn])
-
-
-def _changed_region(frame: Frame, *others: Frame) -> Region | None:
-    """The box of the pixels whose first plane differs."""
-    differs = np.any([other.planes[0] != frame.planes[0] for other in others], axis=0)
-    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
-    if len(rows) == 0:
-        return None
-    return Region(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
 
 
 def pareto(points: NDArray[np.float64]) -> NDArray[np.bool_]:

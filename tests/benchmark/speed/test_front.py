@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from arlight.benchmark.speed.front import measure_front, pareto, picture_error
+from arlight.benchmark.speed.front import measure_front, pareto
 from arlight.benchmark.speed.front_settings import FrontSetting, front_settings
 from arlight.benchmark.speed.relighters import Relighters
 from arlight.lighting_tracker import TrackerSettings
@@ -30,21 +29,6 @@ def test_a_point_is_off_the_front_exactly_where_another_beats_it(points):
 @given(POINTS, st.floats(0.1, 10.0))
 def test_units_do_not_matter(points, factor):
     assert np.array_equal(pareto(points), pareto(points * [factor, 1.0]))
-
-
-def test_a_frame_in_which_nothing_is_drawn_has_no_error(clip):
-    assert np.isnan(picture_error(clip.frames[0], clip.frames[0], clip.frames[0]))
-
-
-def test_the_error_is_that_of_the_pixels_that_were_drawn(clip):
-    frame = clip.frames[0]
-    region = frame.full_region.grown(-100).clipped(frame.size)
-    shape = (region.size[1], region.size[0], 3)
-    reference = frame.with_linear_rgb(region, np.full(shape, 0.4, np.float32))
-    assert picture_error(frame, reference, reference) == 0.0
-    brighter = frame.with_linear_rgb(region, np.full(shape, 0.5, np.float32))
-    # 8 bits and chroma shared by neighbours at the region's border
-    assert picture_error(frame, brighter, reference) == pytest.approx(0.25, rel=0.1)
 
 
 def test_every_setting_has_a_name_of_its_own_and_differs():
