@@ -121,13 +121,16 @@ class LightingTracker:
         self._exposure = _exposure_meter(probe, camera)
         self._probe, self._highest = probe, probe.order
         self._block_order = _block_orders(probe)
-        self._blas = ThreadpoolController().select(user_api="blas") if 2 * len(probe.frequencies) > _ALONE else None
+        self._blas: ThreadpoolController | None = None
+        if assembly is not None or estimator is not None:
+            self._multiply_on_one_thread()
         self._choice: OrderChoice | None = None
         self.reset()
 
     def require(self, need: Need) -> None:
         """Say what the light is wanted for, which the order `auto` goes by; until then all orders are measured."""
         if self.settings.order == "auto":
+            self._multiply_on_one_thread()
             self._choice = OrderChoice(NaturalLight(self._probe.slab, self._probe.frequencies), need)
 
     def reset(self) -> None:
@@ -148,6 +151,11 @@ class LightingTracker:
         """
         with self._one_thread():
             return self._update(frame)
+
+    def _multiply_on_one_thread(self) -> None:
+        """From now on frames need products of matrices; without them, nobody need be asked about threads."""
+        if 2 * len(self._probe.frequencies) > _ALONE:
+            self._blas = ThreadpoolController().select(user_api="blas")
 
     def _one_thread(self) -> AbstractContextManager[object]:
         """Products this small run slower on several threads than on one; asking costs less than setting."""

@@ -33,7 +33,7 @@ class DrawnLight:
     def pass_to(self, weights: Array) -> None:
         """Make weights (m, m) the next; the first ones hold at once."""
         if self._begun:
-            self._from = self._from + self._share * (self._to - self._from)
+            self._from = self._to if self.settled else self._from + self._share * (self._to - self._from)
             self._share = 0.0
         self._to, self._begun = weights, True
 

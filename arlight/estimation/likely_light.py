@@ -14,8 +14,9 @@ class LikelyLight:
 
     expected: Array
     """(m,) real-packed coefficients that are expected of a level of 1."""
-    variation: Array
-    """(m, m) covariance of the coefficients about that, relative to the squared level; none of it in the level."""
+    covariance: Array
+    """(m, m) of the coefficients about that, relative to the squared level and of light of usual strength; none of it
+    in the level."""
 
     @classmethod
     def of_covariance(cls, covariance: Array) -> "LikelyLight":
@@ -27,25 +28,26 @@ class LikelyLight:
         """(n, n) that makes the likeliest coefficients of n measured ones.
 
         Args:
-            errors: (n, n) covariance of the measurement relative to that of the light, of a level of 1.
+            errors: (n, n) covariance of the measurement's errors at a level of 1, over the light's strength; those of
+                the level are ignored.
         """
-        weights, kept, expected = np.eye(len(errors)), self._kept(errors), self.expected[1 : len(errors)]
-        weights[1:, 1:] = kept
-        weights[1:, 0] = expected - kept @ expected
+        weights, gain, expected = np.eye(len(errors)), self._gain(errors), self.expected[1 : len(errors)]
+        weights[1:, 1:] = gain
+        weights[1:, 0] = expected - gain @ expected
         return weights
 
-    def unknown(self, errors: Array) -> Array:
-        """(n, n) covariance of what the likeliest coefficients are wrong by, relative to `variation`'s own scale.
+    def posterior(self, errors: Array) -> Array:
+        """(n, n) covariance of what the likeliest coefficients are wrong by, on the scale of `covariance`.
 
         Args:
             errors: as for `weights`.
         """
-        n, unknown = len(errors), np.zeros_like(errors)
-        varied = self.variation[1:n, 1:n]
-        unknown[1:, 1:] = varied - self._kept(errors) @ varied
-        return unknown
+        n, posterior = len(errors), np.zeros_like(errors)
+        prior = self.covariance[1:n, 1:n]
+        posterior[1:, 1:] = prior - self._gain(errors) @ prior
+        return posterior
 
-    def _kept(self, errors: Array) -> Array:
+    def _gain(self, errors: Array) -> Array:
         """(n - 1, n - 1) S (S + E)^-1: what is kept of a measured distance from what is expected."""
-        varied = self.variation[1 : len(errors), 1 : len(errors)]
-        return np.asarray(np.linalg.solve(varied + errors[1:, 1:], varied).T)
+        prior = self.covariance[1 : len(errors), 1 : len(errors)]
+        return np.asarray(np.linalg.solve(prior + errors[1:, 1:], prior).T)

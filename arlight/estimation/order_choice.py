@@ -56,11 +56,12 @@ class OrderChoice:
         self._learnt_s = self._began_s = -math.inf
         self._left_out = 0.0
         self._doubt = _STANDS_OUT
-        self._rose = self._suspected = False
+        self._rose = self._suspected = self._jumped = False
         self._usual = np.zeros(self.highest + 1)
         self._looked_s = self._judged_s = -math.inf
         self._fits_since_s = math.inf
-        self._strength, self._unsure = 0.0, math.inf
+        self._strength = self._lately = 0.0
+        self._unsure = math.inf
 
     def order_to_measure(self, time_s: float) -> int:
         """Highest order to measure in the frame at a time [s]: the chosen one, now and then all."""
@@ -75,12 +76,10 @@ class OrderChoice:
         if len(seen.frequencies) > len(filtered.frequencies):
             self._looked_s = time_s
             self._look(seen)
-        if self._leaving or filtered.order != self.order:
+        if self._leaving or filtered.order > self.order:
             return
-        self._watch(filtered)
-        if self._suspected or filtered.order < self.order:
-            return
-        if self._is_to_judge(time_s):
+        self._suspected = filtered.order >= self._core and self._is_suspect(filtered)
+        if not self._suspected and self._is_to_judge(time_s):
             self._began_s = time_s if math.isinf(self._began_s) else self._began_s
             self._judged_s = time_s
             self._judge(seen, filtered, time_s)
@@ -103,25 +102,34 @@ class OrderChoice:
         soon = 0.5 if math.isfinite(self._fits_since_s) else 1.0
         return not 0.0 <= time_s - self._judged_s < min(soon * _JUDGE_EVERY_S, time_s - self._began_s)
 
-    def _watch(self, filtered: Lighting) -> None:
-        """Begin anew with all orders, at once, if the light is no longer the one that was judged.
+    def _is_suspect(self, filtered: Lighting) -> bool:
+        """Whether the light seems another one than that which was judged; once that is certain, it is begun anew with.
 
         One frame would hardly tell, for what a second of them averages may be far below the noise of each; nor may the
-        filter's first one of another light be trusted, so that the next has to say the same.
+        filter's first one of another light be trusted, so that the next has to say the same. A light that jumps is
+        drawn as another one at once, one that drifts little by little.
         """
         strength = self._light.strength(filtered, self._core)
-        change, larger = abs(strength - self._strength), max(strength, self._strength)
-        changed = change > _STEP * larger and change > self._doubt * self._unsure
-        if changed and self._suspected:
+        changed, jumped = self._differs(strength, self._strength), self._differs(strength, self._lately)
+        certain, jumps = changed and self._suspected, jumped or self._jumped
+        self._lately, self._jumped = strength, jumped
+        if certain and jumps:
             self.reset()
-            return
-        self._suspected = changed and not self._suspected
+        elif certain:
+            self._rise()
+            # what was learnt of noise was another light's
+            self._usual[:], self._doubt, self._rose = 0.0, _STANDS_OUT, False
+        return changed and not certain
+
+    def _differs(self, strength: float, other: float) -> bool:
+        change = abs(strength - other)
+        return change > _STEP * max(strength, other) and change > self._doubt * self._unsure
 
     def _rise(self) -> None:
         """Follow all orders, to be seen little by little."""
         self.order, self._left_out, self._fits_since_s, self._rose = self.highest, 0.0, math.inf, True
         # what the filter makes of them is not known yet
-        self._leaving, self._began_s, self._judged_s, self._unsure = False, -math.inf, -math.inf, math.inf
+        self._began_s, self._judged_s, self._unsure = -math.inf, -math.inf, math.inf
 
     def _look(self, seen: Lighting) -> None:
         """Follow all orders again if one frame shows more of them than any did before they were left out.
@@ -134,10 +142,18 @@ class OrderChoice:
             self._rise()
 
     def _judge(self, seen: Lighting, filtered: Lighting, time_s: float) -> None:
+        """Think over how much of the orders is drawn and, where no effort leaves any out, which ones are needed."""
+        self._light.take_in(filtered)
+        if filtered.order == self.order:
+            self._choose(seen, filtered, time_s)
+        else:
+            self._compare_with(filtered, filtered.order, 0.0)
+        self._drawn.pass_to(self._light.weights(filtered, self._core if self._leaving else filtered.order))
+
+    def _choose(self, seen: Lighting, filtered: Lighting, time_s: float) -> None:
         """Leave orders out when a lower one has sufficed for a while, by what the filter has made of the noise."""
         if len(seen.frequencies) == len(filtered.frequencies):
             self._usual = np.maximum(_KEPT * self._usual, self._light.beyond(seen))
-        self._light.take_in(filtered)
         squared_error = self._light.squared_errors(filtered)
         least = float(squared_error.min())
         most = max((1.0 + self._tolerance) ** 2 * least, least + self._light.unseen) - self._left_out
@@ -150,11 +166,14 @@ class OrderChoice:
         elif not math.isfinite(self._fits_since_s):
             self._fits_since_s = time_s
         elif time_s - self._fits_since_s >= _LOWER_AFTER_S:
-            self._left_out += float(squared_error[lowest] - squared_error.min())
+            self._left_out += float(squared_error[lowest]) - least
             self._doubt *= 2.0 if self._rose else 1.0
             self._fits_since_s, self._rose, self._leaving = math.inf, False, True
         if self._leaving or self.order == self.highest:
             # what suffices is known best
-            self._core, self._unsure = lowest, max(least, self._light.unseen)
-            self._strength = self._light.strength(filtered, lowest)
-        self._drawn.pass_to(self._light.weights(filtered, self._core if self._leaving else self.order))
+            self._compare_with(filtered, lowest, least)
+
+    def _compare_with(self, filtered: Lighting, core: int, least: float) -> None:
+        """Tell another light by the orders up to `core` and the squared error that this one is expected to have."""
+        self._core, self._unsure = core, max(least, self._light.unseen)
+        self._strength = self._lately = self._light.strength(filtered, core)

@@ -32,9 +32,9 @@ def hemisphere_points(count: int) -> Array:
 
 
 @cache
-def sky_directions() -> tuple[Array, Array]:
+def sky_directions(count: int = _SKY_DIRECTIONS) -> tuple[Array, Array]:
     """Directions (n, 3) that stand for the hemisphere where light is predicted, and their solid angles (n,) [sr]."""
-    return hemisphere_points(_SKY_DIRECTIONS), np.full(_SKY_DIRECTIONS, 2.0 * np.pi / _SKY_DIRECTIONS)
+    return hemisphere_points(count), np.full(count, 2.0 * np.pi / count)
 
 
 @cache

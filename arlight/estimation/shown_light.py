@@ -1,7 +1,8 @@
 """What a picture shows of light: errors and strengths of orders as an object, lit by them, makes them seen.
 
-Light varies about what is expected of it with a covariance s S; s, its strength, is found from how strong its
-independent parts are. What is measured, z, has errors of covariance E, so what is likeliest, and drawn, is
+Light varies about what is expected of it with a covariance s S; s, its strength, is found from how strong the
+independent parts of isotropic light are. What is measured, z, has errors of covariance E, so what is likeliest, and
+drawn, is
 
     m = mu + S (S + E / s)^-1 (z - mu)
 
@@ -9,7 +10,7 @@ A first one, of light that may come from anywhere, tells where the light comes f
 the second one. What an object shows is linear in the coefficients; Q is the squared change of the picture. Drawn up to
 an order K, the light is expected to be wrong by
 
-    error^2(K) = (m_K - m')^T Q (m_K - m') + tr(Q V),     m_K what m up to K makes most probable,
+    error^2(K) = (m_K - m')^T Q (m_K - m') + tr(Q V),     m_K what m up to K makes most probable of isotropic light,
 
 with m' and its covariance V by errors of the size that was found.
 """
@@ -38,6 +39,8 @@ _UNSEEN = 0.02
 """Error of a picture that nobody sees, relative to its picture in the light that is expected."""
 _WEAKEST = 1e-4
 """Least strength; that of an overcast sky, as even as natural light gets, is ten times as much."""
+_LEAST = 1e-8
+"""Least share of the stated errors, and what is never divided by less of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ class Need:
     shown: Array
     """(m, m) Q: squared change of what is wanted, as a quadratic form of the real-packed coefficients."""
     tolerance: float
-    """Share by which a lower order may raise the error."""
+    """Share by which a lower order may raise the error; by as much as nobody sees it may in any case."""
 
 
 class ShownLight:
@@ -65,7 +68,7 @@ class ShownLight:
         order = frequency_order(prior.frequencies)
         self.highest = int(order.max())
         """Order of the sheet."""
-        self._prior, self._shown = prior, need.shown
+        self._prior = prior
         self._natural = IndependentParts(need.independent, need.shown)
         self._ends = np.cumsum(np.bincount(np.concatenate([order[:1], np.repeat(order[1:], 2)])))
         self.reset()
@@ -73,14 +76,14 @@ class ShownLight:
     def reset(self) -> None:
         """Forget the light."""
         self._strength, self._errors = 1.0, 1.0
-        self._likely = self._prior.anywhere
+        self._likely = self._prior.isotropic
 
     def take_in(self, filtered: Lighting) -> None:
         """Learn how strong the light is and where it comes from."""
         squares, stated = self._natural.of(filtered) ** 2, np.diag(self._natural.covariance(filtered))
         self._strength, self._errors = _likeliest(squares.mean(axis=1)[1:], stated[1:], self._strength, self._errors)
         measured, errors = _relative(filtered)
-        guess = self._prior.anywhere.weights(_OF_STATED / self._strength * errors) @ measured
+        guess = self._prior.isotropic.weights(_OF_STATED / self._strength * errors) @ measured
         self._likely = self._prior.as_bright_as(guess.mean(axis=1))
 
     def squared_errors(self, filtered: Lighting) -> Array:
@@ -90,14 +93,15 @@ class ShownLight:
         """
         measured, errors = _relative(filtered)
         n, relative = len(measured), errors / self._strength
+        of_coefficients, shown = self._natural.of_coefficients(n), self._natural.shown[:n, :n]
         # error bars allow for errors that a light need not have
         found = min(self._errors, 1.0) * relative
         truth, drawn = (
-            self._natural.told(n) @ (self._likely.weights(each) @ measured) for each in (found, _OF_STATED * relative)
+            of_coefficients @ (self._likely.weights(each) @ measured) for each in (found, _OF_STATED * relative)
         )
-        shown = self._natural.shown[:n, :n]
         away = [_form(shown, _up_to(drawn, end) - truth) for end in self._ends[: filtered.order + 1]]
-        return np.array(away) + self._strength * float(np.sum(self._shown[:n, :n] * self._likely.unknown(found)))
+        unknown = of_coefficients @ self._likely.posterior(found) @ of_coefficients.T
+        return np.array(away) + self._strength * float(np.sum(shown * unknown))
 
     @property
     def unseen(self) -> float:
@@ -126,10 +130,7 @@ class ShownLight:
     def weights(self, filtered: Lighting, order: int) -> Array:
         """(m, m) that make the likeliest real-packed coefficients of measured ones, up to an order and beyond by it."""
         n, errors = int(self._ends[order]), _relative(filtered)[1]
-        weights = np.zeros_like(self._shown)
-        likely = self._likely.weights(_OF_STATED / self._strength * errors[:n, :n])
-        weights[:, :n] = self._natural.completed(n) @ likely
-        return weights
+        return self._natural.completing(self._likely.weights(_OF_STATED / self._strength * errors[:n, :n]))
 
     def drawn(self, lighting: Lighting, drawn: DrawnLight) -> Lighting:
         """A lighting as it is drawn; error bars as they were."""
@@ -157,7 +158,7 @@ def _likeliest(
         total = strength + errors * stated
         once, twice = 1.0 / total, squares / total**2
         strength = max(strength * math.sqrt(float(twice.sum()) / float(once.sum())), _WEAKEST)
-        errors *= math.sqrt(float(twice @ stated) / max(float(once @ stated), _WEAKEST))
+        errors = max(errors * math.sqrt(float(twice @ stated) / max(float(once @ stated), _LEAST)), _LEAST)
     return strength, errors
 
 

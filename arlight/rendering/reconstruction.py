@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from arlight.estimation.independent_parts import completed
 from arlight.estimation.radiance_prior import (
     observed_covariance,
     radiance_covariance,
@@ -63,9 +64,7 @@ class Reconstruction:
 
         What is reconstructed of these is the best estimate from the first ones alone, as `reconstruct` for them has it.
         """
-        given = np.asarray(packed, float)
-        k = len(given)
-        return self.independent[:, :k] @ np.linalg.solve(self.independent[:k, :k], given)
+        return completed(self.independent, np.asarray(packed, float))
 
     def radiance_rows(self, directions: ArrayLike) -> Array:
         """Radiance rows (d, m) of any unit directions (d, 3); the ground's below the horizon."""

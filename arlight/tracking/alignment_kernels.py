@@ -88,6 +88,7 @@ class AlignmentKernels:
         )
         width, height = camera.image_size
         self._size = (height, width)
+        self._table = np.empty(0, np.float32)
         self._shared.hold({**_constants(template, probe, camera), **self._memory(template)})
         self._at = ctypes.byref(self._shared)
         self._align, self._draw, self._observe = _functions()
@@ -122,20 +123,25 @@ class AlignmentKernels:
         Raises:
             ValueError: not of the camera's size, or the table does not fit the codes.
         """
-        table, shared = picture.table, self._shared
+        shared = self._shared
         luma: NDArray[np.generic] = picture.luma
         if luma.shape != self._size or luma.dtype not in (np.uint8, np.uint16):
             raise ValueError(f"luma must be uint8 or uint16 {self._size}, found {luma.dtype} {luma.shape}")
         across, along = luma.strides
         if along != luma.itemsize or not 0 < across * luma.shape[0] < _FARTHEST_BYTES:
             luma = np.ascontiguousarray(luma)
-        if table.dtype != np.float32 or not table.flags.c_contiguous or len(table) < 256 * luma.itemsize:
-            raise ValueError(f"table must be float32, contiguous, an entry a code; found {table.dtype} {table.shape}")
-        self._picture = luma, table
-        shared.codes, shared.table = luma.ctypes.data, table.ctypes.data
+        if picture.table is not self._table or len(self._table) < 256 * luma.itemsize:
+            self._decode_by(picture.table, 256 * luma.itemsize)
+        self._picture = luma
+        shared.codes = luma.ctypes.data
         shared.stride, shared.code_bytes = luma.strides[0], luma.itemsize
         shared.height, shared.width = luma.shape
-        shared.entries = len(table)
+
+    def _decode_by(self, table: NDArray[np.float32], codes: int) -> None:
+        if table.dtype != np.float32 or not table.flags.c_contiguous or len(table) < codes:
+            raise ValueError(f"table must be float32, contiguous, an entry a code; found {table.dtype} {table.shape}")
+        self._table = table
+        self._shared.table, self._shared.entries = table.ctypes.data, len(table)
 
     def align(self, start: Pose, blur_px: float, coarsest: int) -> bool:
         """Align to the picture shown; pose, result and what the markers say are left in the arrays.

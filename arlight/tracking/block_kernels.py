@@ -13,7 +13,6 @@ from arlight.tracking.block_layout import WANTED, BlockLayout
 from arlight.tracking.block_means import HARMONICS, ROWS, BlockMeans
 from arlight.tracking.decoding import Decoding
 from arlight.tracking.lens import camera_parameters
-from arlight.video.conversion import Plane
 from arlight.video.frame import Frame
 from arlight.video.pixel_format import PixelFormat
 
@@ -145,7 +144,7 @@ class BlockKernels:
             self._curve = curve
             shared.hold({"light": curve.light, "encoding": curve.codes})
             shared.entries, shared.clip = len(curve.light), curve.clip
-        self._planes = [_readable(plane) for plane in (*frame.planes, *2 * frame.planes[:1])[:3]]
+        self._planes = (*frame.planes, *2 * frame.planes[:1])[:3]
         for c, plane in enumerate(self._planes):
             shared.planes[c] = plane.ctypes.data
             shared.stride[c] = plane.strides[0]
@@ -219,11 +218,6 @@ class BlockKernels:
         self._shared.samples = counts.ctypes.data + 8 * n
         self._shared.valid = valid.ctypes.data
         return results, counts, valid
-
-
-def _readable(plane: Plane) -> Plane:
-    """A plane whose codes stand side by side, row below row."""
-    return plane if plane.strides[1] == plane.itemsize and plane.strides[0] > 0 else plane.copy()
 
 
 def _aligned(shape: tuple[int, int]) -> NDArray[np.float32]:

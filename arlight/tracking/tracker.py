@@ -102,7 +102,7 @@ class PoseTracker:
         else:
             self._blur_px += _BLUR_RATE * (found.blur_px - self._blur_px)
         blur = math.sqrt(max(self._blur_px**2 - SAMPLING_VARIANCE_PX2, 0.0))
-        self._used = int(np.count_nonzero(found.used))
+        self._used = found.count
         return ProbePose(found.pose, found.residual_rms_px, "tracked", blur, self._used)
 
     def _check_size(self, luma: Codes) -> None:
@@ -130,7 +130,7 @@ class PoseTracker:
             found = self._align(picture, start, coarsest)
             if found is None or not found.accepted:
                 continue
-            if best is not None or np.count_nonzero(found.used) >= self._used:
+            if best is not None or found.count >= self._used:
                 return found if best is None else max(best, found, key=_fit)
             best = found
         return best

@@ -79,8 +79,9 @@ class Frame:
         found = [p.shape for p in self.planes]
         if found != shapes or any(p.dtype != expected.dtype for p in self.planes):
             raise ValueError(f"planes of {expected} must be {expected.dtype.__name__} of {shapes}, found {found}")
-        # compiled code reads rows
-        views = tuple(p.view() if p.strides[1] == p.itemsize else np.ascontiguousarray(p) for p in self.planes)
+        # compiled code reads rows, one below the other
+        readable = (p.strides[1] == p.itemsize and p.strides[0] > 0 for p in self.planes)
+        views = tuple(p.view() if ok else p.copy() for p, ok in zip(self.planes, readable, strict=True))
         for view in views:
             view.flags.writeable = False
         object.__setattr__(self, "planes", views)

@@ -200,7 +200,7 @@ class Anywhere:
     def __init__(self, frequencies, independent=None):
         self.frequencies = frequencies
         triangle = np.eye(2 * len(frequencies) - 1) if independent is None else independent
-        self.anywhere = LikelyLight.of_covariance(triangle @ triangle.T)
+        self.isotropic = LikelyLight.of_covariance(triangle @ triangle.T)
 
     def as_bright_as(self, _guess):
-        return self.anywhere
+        return self.isotropic

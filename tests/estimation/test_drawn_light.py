@@ -49,6 +49,15 @@ def test_fewer_coefficients_are_weighed_by_the_first_weights():
     np.testing.assert_allclose(drawn.weighed(PACKED[:3]), weights(1)[:3, :3] @ PACKED[:3])
 
 
+def test_weights_that_are_no_numbers_are_gone_with_the_next_but_one():
+    drawn = DrawnLight(6)
+    drawn.pass_to(np.full((6, 6), np.nan))
+    for seed in (1, 2):
+        drawn.pass_to(weights(seed))
+        drawn.wait(10.0)
+    np.testing.assert_allclose(drawn.weighed(PACKED), weights(2) @ PACKED)
+
+
 def test_reset_forgets_the_weights():
     drawn = DrawnLight(6)
     drawn.pass_to(weights(1))

@@ -46,15 +46,15 @@ def test_what_is_certain_stays_and_what_is_unknown_is_what_is_expected(prior: np
 
 def test_precisions_add_up(prior: np.ndarray) -> None:
     light, errors = LikelyLight.of_covariance(prior), covariance(6, 0.3)
-    unknown = light.unknown(errors)
-    assert not np.any(unknown[0])
-    assert not np.any(unknown[:, 0])
-    precision = np.linalg.inv(light.variation[1:, 1:]) + np.linalg.inv(errors[1:, 1:])
-    np.testing.assert_allclose(np.linalg.inv(unknown[1:, 1:]), precision, rtol=1e-6)
+    posterior = light.posterior(errors)
+    assert not np.any(posterior[0])
+    assert not np.any(posterior[:, 0])
+    precision = np.linalg.inv(light.covariance[1:, 1:]) + np.linalg.inv(errors[1:, 1:])
+    np.testing.assert_allclose(np.linalg.inv(posterior[1:, 1:]), precision, rtol=1e-6)
 
 
 def test_the_first_coefficients_are_weighed_by_what_is_known_of_them(prior: np.ndarray) -> None:
     errors = covariance(7, 0.1)[:5, :5]
     whole, cut = LikelyLight.of_covariance(prior), LikelyLight.of_covariance(prior[:5, :5])
     np.testing.assert_allclose(whole.weights(errors), cut.weights(errors), atol=1e-12)
-    np.testing.assert_allclose(whole.unknown(errors), cut.unknown(errors), atol=1e-12)
+    np.testing.assert_allclose(whole.posterior(errors), cut.posterior(errors), atol=1e-12)

@@ -210,6 +210,43 @@ def test_orders_come_and_go_little_by_little() -> None:
     assert 0.0 < max(steps) < 0.1 * most
 
 
+def test_light_that_drifts_is_drawn_without_a_jump() -> None:
+    """From soft to sunny in ten seconds: no frame changes by more than a tenth of the whole way."""
+    choice = OrderChoice(Anywhere(FREQUENCIES), need([1.0] * 5))
+    orders, told = [], []
+    for frame in range(500):
+        share = min(max((frame - 100) / 250.0, 0.0), 1.0)
+        light = [1.0, *(0.03 + share * amplitude for amplitude in (0.8, 0.8, 0.5, 0.5))]
+        time_s = frame / 25.0
+        seen = lighting(light, 0.02, frame, choice.order_to_measure(time_s))
+        filtered = lighting(light, 0.004, 1).truncated(min(choice.order, seen.order))
+        choice.learn(seen, filtered, time_s)
+        shown = choice.shown(filtered)
+        orders.append(shown.order)
+        told.append(np.zeros((len(FREQUENCIES), 3), complex))
+        told[-1][: len(shown.coefficients)] = shown.coefficients
+    assert min(orders) < 4
+    assert orders[-1] == 4
+    steps = np.linalg.norm(np.diff(told, axis=0), axis=(1, 2))
+    assert steps.max() < 0.1 * np.linalg.norm(told[-1] - told[100])
+
+
+def test_what_an_effort_leaves_of_the_orders_is_weighed_too() -> None:
+    """Drawn by how well it is known although the others are never seen, and another light at once."""
+    choice = OrderChoice(Anywhere(FREQUENCIES), need([1.0] * 5))
+    true = {amplitude: lighting(light, 0.0, 0, 2) for amplitude, light in ((0.3, RICH), (0.03, SOFT))}
+    for frame in range(60):
+        light = RICH if frame < 40 else SOFT
+        seen = lighting(light, 0.2, frame, 2)
+        choice.learn(seen, lighting(light, 0.1, frame + 1000, 2), frame / 25.0)
+        measured, expected = lighting(light, 0.1, frame + 1000, 2), true[light[1]].coefficients
+        away = [np.linalg.norm(each.coefficients - expected) for each in (choice.shown(measured), measured)]
+        # the second frame of another light is believed
+        if not 40 <= frame < 42:
+            assert away[0] < away[1]
+    assert choice.order == 4
+
+
 def test_lighting_that_is_well_known_is_shown_as_it_is_once_the_order_has_settled() -> None:
     choice = OrderChoice(Anywhere(FREQUENCIES), need([1.0] * 5))
     settled(choice, RICH, 1e-5)
@@ -221,7 +258,7 @@ def test_lighting_that_is_well_known_is_shown_as_it_is_once_the_order_has_settle
 
 
 def test_what_is_hardly_known_is_shown_closer_to_the_truth_than_it_was_measured() -> None:
-    choice = OrderChoice(Anywhere(FREQUENCIES), need([1.0, 1.0, 1.0, 1.0, 1e-4], tolerance=0.0))
+    choice = OrderChoice(Anywhere(FREQUENCIES), need([1.0, 1.0, 1.0, 1.0, 1e-4]))
     settled(choice, RICH, 0.02)
     true = lighting(RICH, 0.0).truncated(choice.order).coefficients
     measured = [lighting(RICH, 0.02, seed, choice.order) for seed in range(10)]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from arlight.benchmark.evaluation import order_error
 from arlight.camera import Camera, Pose
+from arlight.estimation.independent_parts import completed
 from arlight.estimation.lighting import Lighting
 from arlight.estimation.shown_light import Need
 from arlight.fourier import frequency_order, pack_real
@@ -116,9 +117,8 @@ def need_error(need: Need, lighting: Lighting, truth: FrameTruth) -> float:
         rms of the difference of linear light, relative to the rms of the true picture.
     """
     true, shown = pack_real(truth.coefficients), pack_real(lighting.coefficients)
-    n = len(shown)
-    drawn = need.independent[:, :n] @ np.linalg.solve(need.independent[:n, :n], shown)
-    error, power = (float(np.sum(each * (need.shown @ each))) for each in (drawn - true, true))
+    difference = completed(need.independent, shown) - true
+    error, power = (float(np.sum(each * (need.shown @ each))) for each in (difference, true))
     return float(np.sqrt(error / power)) if power > 0.0 else float("nan")
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from arlight.calibration.camera.paper_samples import PaperSampler, readable_planes
+from arlight.calibration.camera.paper_samples import PaperSampler
 from arlight.camera import Camera, Pose
 from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
@@ -108,8 +108,8 @@ class ExposureMeter:
         if frame.format is not self._format or frame.size != self._size:
             self._decode(frame)
         self._pose[:3], self._pose[3] = pose.rotation, pose.translation
-        planes = readable_planes(frame)
-        _LIBRARY.measure(self._at, self._layout, PictureCodes.of(planes), *self._size, self._pose_at, self._results_at)
+        codes = PictureCodes.of(frame.planes)
+        _LIBRARY.measure(self._at, self._layout, codes, *self._size, self._pose_at, self._results_at)
         smallest = min(self._results[2].tolist()) / (self._results[3, 0] * self._paper_share)
         return PaperLevel(self._results[0].copy(), self._results[1].copy(), min(float(smallest), 1.0))
 

@@ -17,7 +17,6 @@ from arlight.native import Workspace, address, library
 from arlight.probe.design import Probe
 from arlight.probe.frame_layout import window_mm
 from arlight.tracking.lens import camera_parameters
-from arlight.video.conversion import Planes
 from arlight.video.frame import Frame
 from arlight.video.layout import POINTERS, Layout, PictureCodes, layout_of
 
@@ -155,17 +154,11 @@ def read_encoded(frame: Frame, pixels: NDArray[np.integer[Any]]) -> NDArray[np.f
         pixels: columns and rows inside it [px].
     """
     places, out = np.ascontiguousarray(pixels, np.int32), np.empty((3, len(pixels)), np.float32)
-    planes = readable_planes(frame)
     _LIBRARY.read_pixels(
-        layout_of(frame.size, frame.format), PictureCodes.of(planes), len(places), address(places, np.int32),
+        layout_of(frame.size, frame.format), PictureCodes.of(frame.planes), len(places), address(places, np.int32),
         address(out, np.float32),
     )  # fmt: skip
     return out.T
-
-
-def readable_planes(frame: Frame) -> Planes:
-    """A frame's planes with contiguous rows, as compiled code reads them."""
-    return tuple(plane if plane.strides[1] == plane.itemsize else plane.copy() for plane in frame.planes)
 
 
 def _blank_paper(probe: Probe, squares: list[Array], spacing_mm: float) -> tuple[Array, Array]:
