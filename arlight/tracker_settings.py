@@ -21,7 +21,7 @@ class TrackerSettings:
     order: Order = "auto"
     """Highest order of the light that is measured, from 0 to the sheet's, or `all` of them. `auto` goes by what the
     data support and the object shows, and takes all where none is drawn; where a lower one does, the light is measured
-    in every third or fourth frame. Blocks of higher orders are not looked at."""
+    in every fourth frame at most. Blocks of higher orders are not looked at."""
     filtered: bool = True
     """Average over time; without it every frame stands alone."""
     bounces: bool = True

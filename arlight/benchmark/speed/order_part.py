@@ -25,7 +25,8 @@ OBJECTS = {
 }
 """Looks of the default object."""
 LEAST_FRAMES = 24
-"""Frames over which costs are averaged: a look at all orders, once a second, counts in every one of them."""
+"""Frames over which costs are averaged: the order is thought over in every one of them; all orders are looked at in
+every other one."""
 _SETTLING = 72
 """Frames until a lower order has been taken where one suffices."""
 

@@ -34,10 +34,10 @@ def test_every_look_is_compared_with_every_order(found, clip):
         assert row["cost_over_all_orders"] > 0.0
 
 
-def test_light_that_is_well_known_is_drawn_as_a_fixed_order_measures_it(found):
+def test_light_that_is_well_known_is_drawn_no_worse_than_a_fixed_order_measures_it(found):
     for row in found.details["order"]:
         (taken,) = np.flatnonzero(row["orders"])
-        assert row["error_of_auto"] == pytest.approx(row["error_by_order"][taken], rel=1e-3)
+        assert row["error_of_auto"] <= 1.001 * row["error_by_order"][taken]
 
 
 def test_what_is_gated_has_names_of_its_own(found, clip):
