@@ -144,10 +144,12 @@ class BlockKernels:
             self._curve = curve
             shared.hold({"light": curve.light, "encoding": curve.codes})
             shared.entries, shared.clip = len(curve.light), curve.clip
-        self._planes = (*frame.planes, *2 * frame.planes[:1])[:3]
-        for c, plane in enumerate(self._planes):
-            shared.planes[c] = plane.ctypes.data
-            shared.stride[c] = plane.strides[0]
+        # while its codes are read
+        self._frame = frame
+        for channel in range(3):
+            plane = channel if channel < len(frame.planes) else 0
+            shared.planes[channel] = frame.places.planes[plane]
+            shared.stride[channel] = frame.places.strides[plane]
 
     def survey(self) -> tuple[Array, NDArray[np.int32]]:
         """Mean luma and chroma (blocks, 3) of every block, and of how many chroma samples each is."""

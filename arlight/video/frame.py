@@ -1,6 +1,6 @@
 """One picture of a video: its planes as decoded, and exact conversion between them and linear light."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from arlight.color import Transfer
 from arlight.video import conversion, dimming
 from arlight.video.conversion import FloatImage, Planes
+from arlight.video.layout import PictureCodes
 from arlight.video.pixel_format import PixelFormat
 
 
@@ -70,6 +71,8 @@ class Frame:
     """Arrays (h, w) of codes: (Y, Cb, Cr) with chroma as stored, one grey plane, or (R, G, B)."""
     format: PixelFormat
     """What the codes mean."""
+    places: PictureCodes = field(init=False, repr=False)
+    """Where the planes are, as compiled code takes them; to be read only, while the frame is kept."""
 
     def __post_init__(self) -> None:
         expected = self.format
@@ -85,6 +88,7 @@ class Frame:
         for view in views:
             view.flags.writeable = False
         object.__setattr__(self, "planes", views)
+        object.__setattr__(self, "places", PictureCodes.of(views))
 
     @classmethod
     def from_rgb(

@@ -27,7 +27,7 @@ _LIBRARY.measure.argtypes = [
 ]  # fmt: skip
 _LIBRARY.measure.restype = None
 _SPACING_MM = 2.2
-_MOST_POINTS = 256
+_MOST_POINTS = 160
 """Pixels that are read: parts of the frame err together, so that more of each say nothing more."""
 
 
@@ -108,8 +108,7 @@ class ExposureMeter:
         if frame.format is not self._format or frame.size != self._size:
             self._decode(frame)
         self._pose[:3], self._pose[3] = pose.rotation, pose.translation
-        codes = PictureCodes.of(frame.planes)
-        _LIBRARY.measure(self._at, self._layout, codes, *self._size, self._pose_at, self._results_at)
+        _LIBRARY.measure(self._at, self._layout, frame.places, *self._size, self._pose_at, self._results_at)
         smallest = min(self._results[2].tolist()) / (self._results[3, 0] * self._paper_share)
         return PaperLevel(self._results[0].copy(), self._results[1].copy(), min(float(smallest), 1.0))
 

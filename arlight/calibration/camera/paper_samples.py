@@ -155,7 +155,7 @@ def read_encoded(frame: Frame, pixels: NDArray[np.integer[Any]]) -> NDArray[np.f
     """
     places, out = np.ascontiguousarray(pixels, np.int32), np.empty((3, len(pixels)), np.float32)
     _LIBRARY.read_pixels(
-        layout_of(frame.size, frame.format), PictureCodes.of(frame.planes), len(places), address(places, np.int32),
+        layout_of(frame.size, frame.format), frame.places, len(places), address(places, np.int32),
         address(out, np.float32),
     )  # fmt: skip
     return out.T
