@@ -27,7 +27,7 @@ _LIBRARY.measure.argtypes = [
 ]  # fmt: skip
 _LIBRARY.measure.restype = None
 _SPACING_MM = 2.2
-_MOST_POINTS = 160
+_MOST_POINTS = 256
 """Pixels that are read: parts of the frame err together, so that more of each say nothing more."""
 
 

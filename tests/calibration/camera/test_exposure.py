@@ -124,7 +124,7 @@ def robust_level(samples, light, mean, half_mm):
 
 
 def test_the_surface_is_that_of_iterated_least_squares(frames, small_sheet, lens_camera):
-    meter, sampler = ExposureMeter(small_sheet, lens_camera), PaperSampler(small_sheet, lens_camera, 2.2, 160)
+    meter, sampler = ExposureMeter(small_sheet, lens_camera), PaperSampler(small_sheet, lens_camera, 2.2, 256)
     half_mm = np.array(small_sheet.sheet_mm) / 2.0
     mean = quadratic(*(sampler.paper_mm / half_mm).T).mean(axis=0)
     code = 1.0 / 255.0
