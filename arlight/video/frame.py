@@ -90,6 +90,10 @@ class Frame:
         object.__setattr__(self, "planes", views)
         object.__setattr__(self, "places", PictureCodes.of(views))
 
+    def __reduce__(self) -> tuple[type["Frame"], tuple[int, float, Planes, PixelFormat]]:
+        """What makes it anew elsewhere, where its planes are in other places."""
+        return Frame, (self.index, self.time_s, self.planes, self.format)
+
     @classmethod
     def from_rgb(
         cls, image: NDArray[np.uint8], index: int = 0, time_s: float = 0.0, transfer: Transfer = "srgb"

@@ -1,3 +1,4 @@
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -334,3 +335,13 @@ def test_regions_clip_and_grow():
     assert Region(4, 4, 8, 9).joined(Region(6, 1, 7, 12)) == Region(4, 1, 8, 12)
     assert Region(4, 4, 8, 9).grown(2) == Region(2, 2, 10, 11)
     assert random_frame(YUV420).linear_rgb(Region(5, 5, 5, 9)).shape == (4, 0, 3)
+
+
+def test_a_frame_that_was_sent_elsewhere_is_the_same_there():
+    frame = Frame.from_rgb(np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8), 3, 0.12)
+    there = pickle.loads(pickle.dumps(frame))
+    assert (there.index, there.time_s, there.format) == (frame.index, frame.time_s, frame.format)
+    np.testing.assert_array_equal(there.linear_rgb(), frame.linear_rgb())
+    for k, plane in enumerate(there.planes):
+        assert there.places.planes[k] == plane.ctypes.data
+        assert there.places.strides[k] == plane.strides[0]
