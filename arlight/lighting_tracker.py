@@ -42,8 +42,8 @@ _LEAST_ORDER = 1
 """Order up to which blocks are measured at least, where the sheet has it: lamps in the few blocks without stripes leave
 nothing that tells L_0."""
 _LOWER_EVERY = 4
-"""Light is measured in every so-manieth frame at most where a lower order than the sheet's was found to suffice: that
-tells the filter as well what it averages, and a change is still seen soon."""
+"""Frames from one in which light is measured to the next, at least, where a lower order than the sheet's was found to
+suffice: that tells the filter as well what it averages, and a change is still seen soon."""
 _FIRST_PASSES = 3
 """How often the first frame is measured until its colour lines have settled."""
 
